@@ -6,7 +6,6 @@ system kills a process without a message: only a check beforehand can name the l
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,16 +15,14 @@ try:
 except ImportError:  # on Windows
     resource = None  # type: ignore[assignment]
 
+from .cgroup import cgroup_folders, text_of
 from .errors import RippleError
 
 _UNCHECKED_BYTES = 32e6  # less memory than this always fits, and is not checked
 
-# Files of a cgroup's limit and of its memory in use, by the cgroup's controller, which has no name in
-# version 2.
-_CGROUP_FILES = {
-    "": ("memory.max", "memory.current"),
-    "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes"),
-}
+# Files of a cgroup's limit and of its memory in use, in versions 1 and 2.
+_FILES = ("memory.max", "memory.current")
+_FILES_OF_VERSION_1 = ("memory.limit_in_bytes", "memory.usage_in_bytes")
 
 
 def require_memory(error: type[RippleError], need: float, what: str, advice: str) -> None:
@@ -57,21 +54,10 @@ def rooms(root: Path = Path("/")) -> Iterator[tuple[float, str]]:
             used = _table(root / "proc/self/status").get("VmSize", 0.0)
             name = f"the limit of the address space (ulimit -v, {_shown(address_space)})"
             yield address_space - used, name
-    for line in _text(root / "proc/self/cgroup").splitlines():
-        _, controller, name = line.split(":", 2)
-        if controller in _CGROUP_FILES:
-            yield from _cgroup_rooms(root / "sys/fs/cgroup" / controller, name, controller)
-
-
-def _cgroup_rooms(top: Path, name: str, controller: str) -> Iterator[tuple[float, str]]:
-    """The memory that the limits of a cgroup and of the groups above it leave [bytes]."""
-    limit_file, usage_file = _CGROUP_FILES[controller]
-    own_folder = top / name.strip("/")
-    for folder in (own_folder, *own_folder.parents):
-        if not folder.is_relative_to(top):
-            break
-        limit = _text(folder / limit_file).strip()
-        usage = _text(folder / usage_file).strip()
+    for folder, is_first_version in cgroup_folders("memory", root):
+        limit_file, usage_file = _FILES_OF_VERSION_1 if is_first_version else _FILES
+        limit = text_of(folder / limit_file).strip()
+        usage = text_of(folder / usage_file).strip()
         if limit.isdigit() and usage.isdigit():
             # cached files make room, and do not count
             cached = _table(folder / "memory.stat", scale=1).get("inactive_file", 0.0)
@@ -81,15 +67,8 @@ def _cgroup_rooms(top: Path, name: str, controller: str) -> Iterator[tuple[float
 
 def _table(path: Path, scale: int = 1024) -> dict[str, float]:
     """The numbers of a file of names and numbers, by name, times `scale`."""
-    rows = (line.replace(":", " ").split() for line in _text(path).splitlines())
+    rows = (line.replace(":", " ").split() for line in text_of(path).splitlines())
     return {row[0]: float(row[1]) * scale for row in rows if len(row) > 1 and row[1].isdigit()}
-
-
-def _text(path: Path) -> str:
-    """The text of a file, or nothing where there is no such file, as on other systems."""
-    with contextlib.suppress(OSError):
-        return path.read_text()
-    return ""
 
 
 def _shown(size: float) -> str:

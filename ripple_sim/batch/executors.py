@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from ripple_sim.errors import BatchError
+from ripple_sim.solver.cores import available_cores
 from ripple_sim.solver.errors import shown, user_line, work_for
 
 # Two tasks for each Dask thread, so that no thread waits for its next task.
@@ -99,13 +100,6 @@ class DaskExecutor(Executor):
             f"the Dask scheduler at {self._address} is gone; finished scenes are kept: start it, "
             "and run the same command again to go on"
         )
-
-
-def available_cores() -> list[int]:
-    """Numbers of the cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return sorted(os.sched_getaffinity(0))
-    return list(range(os.cpu_count() or 1))
 
 
 def usual_workers() -> int:

@@ -8,4 +8,4 @@ from .gl_fields import (
     TexelList as TexelList,
     bind_buffers as bind_buffers,
 )
-from .kernels import advance as advance, fill as fill
+from .kernels import advance as advance

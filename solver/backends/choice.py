@@ -18,11 +18,16 @@ _TYPICAL_TEXELS = 6 * 128**2  # of a target in a video
 
 
 def make_backend(
-    name: str, operator: WaveOperator, *, keeps_volume: bool | None = False
+    name: str,
+    operator: WaveOperator,
+    *,
+    keeps_volume: bool | None = False,
+    threads: int | None = None,
 ) -> Backend:
     """A backend by name; "auto" takes the faster one, see `auto_backend`.
 
-    Deep fluid is always computed on the CPU.
+    Deep fluid is always computed on the CPU. `threads` is the number of threads of the CPU backend,
+    by default as many as pay.
 
     Raises
     ------
@@ -41,7 +46,7 @@ def make_backend(
         name = auto_backend(operator.mass.size)
     if name == "gl":
         return GLBackend(operator, keeps_volume=keeps_volume)
-    return CPUBackend(operator, keeps_volume=keeps_volume)
+    return CPUBackend(operator, keeps_volume=keeps_volume, threads=threads)
 
 
 def auto_backend(texels: int = _TYPICAL_TEXELS) -> str:

@@ -1,8 +1,6 @@
 """CPU backend: the leapfrog update as one pass over the texels, compiled by numba.
 
-One thread: a substep takes 0.07 ms at N = 128 and 0.3 ms at N = 256, less than a helper may wait
-for its core while other threads render and encode. Waiting for it then costs more than two threads
-gain.
+Large surfaces are stepped by several threads, see `crews`.
 """
 
 from __future__ import annotations
@@ -21,6 +19,7 @@ from ..operator.wave_operator import WaveOperator
 from ..texels.stencil import Stencil
 from ..texels.topology import TexelTopology
 from . import kernels
+from .crews import Team
 from .field_backend import FieldBackend
 from .kernels import (
     NO_BALANCE,
@@ -37,6 +36,7 @@ from .kernels import (
     State,
     Weights,
 )
+from .meeting import alone
 
 # Below this resolution [texels along a side] charts lie side by side, row by row: one loop then runs
 # over a row of all charts. On charts of 12 columns, a loop for each chart takes four times as long.
@@ -242,8 +242,15 @@ class CPUBackend(FieldBackend):
 
     name = "cpu"
 
-    def __init__(self, operator: WaveOperator, *, keeps_volume: bool | None = False) -> None:
+    def __init__(
+        self,
+        operator: WaveOperator,
+        *,
+        keeps_volume: bool | None = False,
+        threads: int | None = None,
+    ) -> None:
         self.keeps_volume = keeps_volume
+        self._team = Team(operator.mass.size, threads)
         self._fields = fields = RowLayout(operator.topology)
         # the processor takes a store to one field and a load from another at the same place of a
         # page for a conflict: each field begins elsewhere in its page
@@ -320,7 +327,8 @@ class CPUBackend(FieldBackend):
         )
         sum_count = 0 if self._probes is None else len(self._probes.heights)
         self._sums = np.zeros((substeps, sum_count), np.float32)
-        kernels.advance(
+        step = functools.partial(
+            kernels.advance,
             substeps,
             np.float32(dt),
             state,
@@ -330,6 +338,12 @@ class CPUBackend(FieldBackend):
             None if self._plain else self._features,
             None if self._probes is None else ProbedSums(self._probes, self._sums),
         )
+        # a curvature pulls at texels of other threads, and a kept volume is one sum over all texels
+        can_be_shared = self._balance is None and not len(self._features.squares.force)
+        if can_be_shared:
+            self._team.run(step, substeps)
+        else:
+            step(alone())
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
         if self._crests is not None:

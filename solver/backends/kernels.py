@@ -7,6 +7,9 @@ loop over columns: the compiler then makes better vector code of that loop.
 Fields are float32 charts with halo, see `RowLayout`, and all of them are flat here: indices of
 several axes take twice as long to compile. A coefficient is a number or a flat field [C n columns];
 a number costs no read. Arrays that belong together are one argument.
+
+Several threads may take a step together: each has a share of the rows, and of the addresses from
+its first row to the next thread's. A crew of one thread does everything.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from ..kernel import Floats, Floats32, Ints, kernel
+from .meeting import Crew, meet, share
 
 Coefficient: TypeAlias = Floats32 | np.float32
 
@@ -115,14 +119,47 @@ def irregular_force(links: Links, i: int, h: Floats32) -> np.float32:
     return force
 
 
+class Share(NamedTuple):
+    """What one thread does of a step."""
+
+    first_row: int  # of all charts' rows
+    last_row: int  # the row after the last
+    first_address: int  # in a field with halo
+    last_address: int  # the address after the last
+
+
 @kernel(no_cpython_wrapper=True)
-def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Floats32) -> None:
-    """Apply the stencil to a field, times a factor; write the result into `out`, or add it."""
+def share_of(stencil: Weights, size: int, crew: Crew) -> Share:
+    """The rows of a thread, and its addresses in fields of `size` numbers.
+
+    The thread's addresses end where the first row of the next thread begins.
+    """
+    n = stencil.rows.shape[2] - 1
+    pitch = stencil.rows.shape[3]
+    row_count = len(stencil.rows) * n
+    first_row, last_row = share(row_count, crew)
+    first_address = 0
+    last_address = size
+    if first_row > 0:
+        first_address = (first_row // n * (n + 2) + first_row % n + 1) * pitch
+    if last_row < row_count:
+        last_address = (last_row // n * (n + 2) + last_row % n + 1) * pitch
+    return Share(first_row, last_row, first_address, last_address)
+
+
+@kernel(no_cpython_wrapper=True)
+def apply(
+    stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Floats32, own: Share
+) -> None:
+    """Apply the stencil to a field, times a factor; write the result into `out`, or add it.
+
+    Only at the thread's own texels.
+    """
     w = stencil.rows
     columns = stencil.columns
     n = w.shape[2] - 1
     pitch = w.shape[3]
-    for i in range(len(w) * n):
+    for i in range(own.first_row, own.last_row):
         chart = i // n
         r = i % n + 1
         at = (chart * (n + 2) + r) * pitch
@@ -146,8 +183,10 @@ def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Fl
             result[c] = result[c] + force if add else force
     irregular = stencil.irregular
     for i in range(len(irregular.texels)):
-        force = value_in(factor, irregular.texels[i]) * irregular_force(irregular, i, h)
-        out[irregular.addresses[i]] += force
+        address = irregular.addresses[i]
+        if own.first_address <= address < own.last_address:
+            force = value_in(factor, irregular.texels[i]) * irregular_force(irregular, i, h)
+            out[address] += force
 
 
 class Kick(NamedTuple):
@@ -395,8 +434,12 @@ def _probe(
 
 
 @kernel(no_cpython_wrapper=True)
-def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.float32) -> None:
+def kick_drift(
+    h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.float32, own: Share
+) -> None:
     """One substep: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v.
+
+    Only at the thread's own texels.
 
     The small terms are added up first: a rounding at the size of the velocity happens once a
     substep. Such roundings would gather over many substeps.
@@ -405,7 +448,7 @@ def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.fl
     columns = kick.stencil.columns
     n = w.shape[2] - 1
     pitch = w.shape[3]
-    for i in range(len(w) * n):
+    for i in range(own.first_row, own.last_row):
         chart = i // n
         r = i % n + 1
         first = i * columns
@@ -443,29 +486,37 @@ def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.fl
             result[c] = row[c] + dt * new
     irregular = kick.stencil.irregular
     for i in range(len(irregular.texels)):
-        kicked = kick.gain[irregular.texels[i]] * irregular_force(irregular, i, h)
         address = irregular.addresses[i]
-        v[address] += kicked
-        h_next[address] += dt * kicked
+        if own.first_address <= address < own.last_address:
+            kicked = kick.gain[irregular.texels[i]] * irregular_force(irregular, i, h)
+            v[address] += kicked
+            h_next[address] += dt * kicked
 
 
-@kernel
-def fill(h: Floats32, halo: Ints) -> None:
-    """Copy the texels beyond the charts' borders into the halo.
+@kernel(no_cpython_wrapper=True)
+def fill(h: Floats32, halo: Ints, crew: Crew) -> None:
+    """Copy the texels beyond the charts' borders into the halo: this thread's share of it.
 
     `halo` [2, k] has the addresses of the halo's places, and of the texels that they show.
     """
-    for i in range(halo.shape[1]):
+    first, last = share(halo.shape[1], crew)
+    for i in range(first, last):
         h[halo[0, i]] = h[halo[1, i]]
 
 
-@kernel
-def flow(h: Floats32, limit: Floats32, dent: Floats32) -> None:
-    """Move the part of the elastic height beyond the yield height into the permanent height."""
-    for i in range(len(h)):
-        elastic = min(max(h[i], -limit[i]), limit[i])
-        dent[i] += h[i] - elastic
-        h[i] = elastic
+@kernel(no_cpython_wrapper=True)
+def flow(h: Floats32, limit: Floats32, dent: Floats32, own: Share) -> None:
+    """Move the part of the elastic height beyond the yield height into the permanent height.
+
+    Only at the thread's own texels.
+    """
+    own_h = h[own.first_address : own.last_address]
+    own_limit = limit[own.first_address : own.last_address]
+    own_dent = dent[own.first_address : own.last_address]
+    for i in range(len(own_h)):
+        elastic = min(max(own_h[i], -own_limit[i]), own_limit[i])
+        own_dent[i] += own_h[i] - elastic
+        own_h[i] = elastic
 
 
 @kernel
@@ -478,11 +529,14 @@ def advance(
     viscosity: Weights | None,
     features: Features | None,
     probed: ProbedSums | None,
+    crew: Crew,
 ) -> None:
     """Take substeps of dt [s], from the first half drift to the last.
 
     The height ends in `state.h_next` where the number of substeps is odd. The sums of the probes
-    are filled in. Code for an argument that is None is compiled away.
+    are filled in. Code for an argument that is None is compiled away. All threads of the crew call
+    this function; each steps its own texels. Curvatures and a volume that is kept need a crew of
+    one thread.
     """
     half = dt / np.float32(2)
     h = state.h
@@ -490,38 +544,77 @@ def advance(
     h_next = state.h_next
     dent = state.dent
     halo = state.halo
-    for i in range(len(h)):  # the halo is filled again below
-        h[i] += half * v[i]
+    own = share_of(kick.stencil, len(h), crew)
+    if not meet(crew):
+        return  # the step is abandoned before it began
+    drift(h, v, half, own)
     if features is not None and len(features.limit):
-        flow(h, features.limit, dent)
+        flow(h, features.limit, dent, own)
     for step in range(substeps):
-        fill(h, halo)
+        meet(crew)  # all heights and velocities are known
+        fill(h, halo, crew)
         if viscosity is not None:
-            fill(v, halo)
-            apply(viscosity, v, np.float32(1), False, kick.extra)
+            fill(v, halo, crew)
+        meet(crew)  # the halo is filled
+        if viscosity is not None:
+            apply(viscosity, v, np.float32(1), False, kick.extra, own)
         if features is not None:
-            _bend(h, halo, features, viscosity is not None, kick.extra)
+            _bend(h, halo, features, viscosity is not None, kick.extra, own, crew)
             _keep_volume(features.balance, h, v)
+        if viscosity is not None:
+            meet(crew)  # nobody reads the velocities of others any more
         drifted = dt if step < substeps - 1 else half
-        kick_drift(h, v, h_next, kick, drifted)
+        kick_drift(h, v, h_next, kick, drifted, own)
         h, h_next = h_next, h
-        for i in range(len(pulses.addresses)):
-            address = pulses.addresses[i]
-            v[address] += pulses.velocities[i]
-            h[address] += drifted * pulses.velocities[i]
+        push(h, v, pulses, drifted, own)
         if probed is not None:
-            _probe(probed.probes, h, v, dent, drifted - half, probed.sums[step])
+            meet(crew)  # all heights and velocities are known
+            if crew.rank == 0:
+                _probe(probed.probes, h, v, dent, drifted - half, probed.sums[step])
+            meet(crew)  # the sums are taken
         if features is not None and len(features.limit):
-            flow(h, features.limit, dent)
+            flow(h, features.limit, dent, own)
 
 
 @kernel(no_cpython_wrapper=True)
-def _bend(h: Floats32, halo: Ints, features: Features, add: bool, extra: Floats32) -> None:
+def drift(h: Floats32, v: Floats32, dt: np.float32, own: Share) -> None:
+    """Add dt v to h at the thread's own addresses; the halo among them is filled again later."""
+    own_h = h[own.first_address : own.last_address]
+    own_v = v[own.first_address : own.last_address]
+    for i in range(len(own_h)):
+        own_h[i] += dt * own_v[i]
+
+
+@kernel(no_cpython_wrapper=True)
+def push(h: Floats32, v: Floats32, pulses: Pulses, dt: np.float32, own: Share) -> None:
+    """Add the pulses to the velocities, and to the heights that have drifted for dt [s] since.
+
+    Only at the thread's own texels.
+    """
+    for i in range(len(pulses.addresses)):
+        address = pulses.addresses[i]
+        if own.first_address <= address < own.last_address:
+            v[address] += pulses.velocities[i]
+            h[address] += dt * pulses.velocities[i]
+
+
+@kernel(no_cpython_wrapper=True)
+def _bend(
+    h: Floats32,
+    halo: Ints,
+    features: Features,
+    add: bool,
+    extra: Floats32,
+    own: Share,
+    crew: Crew,
+) -> None:
     """Write the forces of bending into `extra`, or add them; nothing without bending."""
     if len(features.moment):
-        apply(features.laplace, h, features.rigidity, False, features.moment)
-        fill(features.moment, halo)
-        apply(features.laplace, features.moment, np.float32(-1), add, extra)
+        apply(features.laplace, h, features.rigidity, False, features.moment, own)
+        meet(crew)  # all moments are known
+        fill(features.moment, halo, crew)
+        meet(crew)  # their halo is filled
+        apply(features.laplace, features.moment, np.float32(-1), add, extra, own)
     if len(features.squares.force):
         bend(features.squares, h, halo, add, extra)
 

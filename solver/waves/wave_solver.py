@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..backends.choice import make_backend
+from ..backends.crews import checked_threads
 from ..backends.gl_fields import DeviceField
 from ..errors import SolverError, checked, instance
 from ..memory import require_memory
@@ -59,6 +60,12 @@ class WaveSolver:
         the density varies, a uniform pressure also keeps the volume while the waves run, unless
         something holds the surface: a clamp, a fixed rim, or stiffness that varies. Deep fluid
         always keeps its volume.
+    threads : int, optional
+        Threads of the backend "cpu". By default as many as the process has cores where the surface
+        is so large that threads pay, from 200,000 texels on; the environment variable
+        `RIPPLE_SIM_THREADS` sets another default. The heights are the same, bit for bit, with any
+        number. Plates with curvatures at rims, volumes that are kept at uneven density, and deep
+        fluid are stepped by one thread.
 
     Attributes
     ----------
@@ -94,7 +101,9 @@ class WaveSolver:
         operator: str = "fem",
         rim: Rim = "free",
         conserve_volume: bool | None = None,
+        threads: int | None = None,
     ) -> None:
+        self._threads = checked_threads(threads)
         self.material = material if material is not None else Material()
         require_memory(
             SolverError,
@@ -117,7 +126,9 @@ class WaveSolver:
         self.time = 0.0
         self.substeps_taken = 0
         self._substep = 0.0
-        self._backend = make_backend(backend, operator, keeps_volume=conserve_volume)
+        self._backend = make_backend(
+            backend, operator, keeps_volume=conserve_volume, threads=self._threads
+        )
         self._balance = VolumeBalance(operator, conserve_volume)
         self._held = HeldLoad(self._backend, operator.source_share, self._balance)
         self._guard = FiniteGuard(atlas.positions)
@@ -460,10 +471,10 @@ class WaveSolver:
     def __getstate__(self) -> tuple[Any, ...]:
         """The state for `copy` and `pickle`: a copy continues like the original, bit for bit."""
         surface = self.rest, self.material, self._kind, self.operator, copy.copy(self._motion)
-        return surface, self.backend, self._backend.keeps_volume, self.state
+        return surface, self.backend, self._backend.keeps_volume, self._threads, self.state
 
     def __setstate__(self, pickled: tuple[Any, ...]) -> None:
-        surface, backend, conserve_volume, state = pickled
+        surface, backend, conserve_volume, self._threads, state = pickled
         atlas, self.material, self._kind, operator, motion = surface
         self._begin(atlas, operator, backend, conserve_volume)
         self._motion = motion

@@ -8,6 +8,7 @@ from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Material, TexelMesh, texel_atlas
 from ripple_sim.solver.backends import CPUBackend, advance
+from ripple_sim.solver.backends.kernels import Probes
 from ripple_sim.solver.operator import WaveOperator, build_operator
 from ripple_sim.solver.texels import stiffness_matrix
 
@@ -197,3 +198,30 @@ def test_one_height_that_is_no_number_is_noticed(
     height[texel] = poison
     backend.set_height(height)
     assert not backend.finite()
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("mesh", MESHES)
+def test_any_number_of_threads_gives_the_same_bits(mesh: str, material: str) -> None:
+    texels = MESHES[mesh]
+    operator = operator_of(texels, MATERIALS[material](texels))
+    probes = Probes(
+        begins=np.array([0, 2]),
+        texels=np.array([0, texels.areas.size - 1]),
+        weights=np.array([0.5, 2.0], np.float32),
+        heights=np.array([True]),
+    )
+    results = []
+    for threads in (1, 2, 3, 8):
+        backend = CPUBackend(operator, threads=threads)
+        backend.set_height(noise(texels, 1) * operator.free)
+        backend.set_velocity(noise(texels, 2) * operator.free)
+        backend.load(np.array([0, texels.areas.size - 1]), np.array([0.3, -0.2]), -0.7)
+        backend.probe(probes)
+        backend.advance(7, step_of(operator))
+        backend.probe(None)
+        backend.advance(4, step_of(operator))
+        results.append([backend.height(), backend.velocity(), backend.dent(), backend.probed()])
+    for result in results[1:]:
+        for values, expected in zip(result, results[0], strict=True):
+            np.testing.assert_array_equal(values, expected)
