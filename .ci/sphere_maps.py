@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.coupling import TARGET_TYPES, find_target, is_soft
+from ripple_sim.coupling import TARGET_TYPES, find_target, is_geom
 from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.scene import load_scene, shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, sphere_map_path
@@ -13,7 +13,10 @@ for name in shipped_scenes():
     scene = load_scene(name)
     for target in scene.targets:
         geom = find_target(scene.model, target.geom)
-        if is_soft(scene.model, geom) or TARGET_TYPES[int(scene.model.geom_type[geom])] == "sphere":
+        if (
+            not is_geom(geom, scene.model)
+            or TARGET_TYPES[int(scene.model.geom_type[geom])] == "sphere"
+        ):
             continue
         mesh = target_mesh(scene.model, geom)
         if not mesh.closed or mesh.genus.tolist() != [0]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.soft import first_skin
+from ripple_sim.coupling.ids import TargetId, target_of_skin
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.height_map_textures import AnyHeightMap, MovedHeightMap
 from ripple_sim.render.surfaces.surface import Charts
@@ -147,7 +147,7 @@ class FrameSource:
             meshes[geom] = (V, mesh.F)
         model = self._simulation.model
         # soft targets come after the geoms; their frame is the world's
-        soft_count = first_skin(model) + model.nskin - model.ngeom
+        soft_count = target_of_skin(model, model.nskin) - model.ngeom
         positions = np.concatenate([data.geom_xpos, np.zeros((soft_count, 3))])
         rotations = np.concatenate(
             [data.geom_xmat.reshape(-1, 3, 3), np.tile(np.eye(3), (soft_count, 1, 1))]
@@ -160,5 +160,5 @@ class FrameSource:
         data = snapshot.data
         return viewpoint(simulation.model, data, simulation.scene.camera, data.time)
 
-    def _height_maps_by_geom(self, snapshot: Snapshot) -> dict[int, AnyHeightMap]:
+    def _height_maps_by_geom(self, snapshot: Snapshot) -> dict[TargetId, AnyHeightMap]:
         return {self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()}

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.ids import TargetId
 from ripple_sim.render.pose import Pose
 from ripple_sim.render.surface_image import SurfaceImage
 from ripple_sim.render.surfaces.adaptive import spline_heights, spline_samples
@@ -40,8 +41,8 @@ class Sighting:
     pose: Pose
     positions: NDArray[np.float64]
     rotations: NDArray[np.float64]
-    height_maps: Mapping[int, NDArray[np.float32]]
-    meshes: Mapping[int, tuple[NDArray, NDArray]]
+    height_maps: Mapping[TargetId, NDArray[np.float32]]
+    meshes: Mapping[TargetId, tuple[NDArray, NDArray]]
 
     @property
     def positions_seen(self) -> NDArray[np.float64]:
@@ -78,7 +79,7 @@ class Sighting:
         return flow
 
     def _on_later_waves(
-        self, geom: int, mask: NDArray[np.bool_], local: NDArray[np.float64], later: Sighting
+        self, geom: TargetId, mask: NDArray[np.bool_], local: NDArray[np.float64], later: Sighting
     ) -> NDArray[np.float64]:
         """Points of a target, `local` [k, 3] in its frame [m], on mesh and waves of `later`.
 

@@ -27,6 +27,10 @@ from .high_pass import HighPass as HighPass, coarse_motions as coarse_motions
 from .hooks import (
     adopt_warnings as adopt_warnings,
 )
+from .ids import (
+    is_geom as is_geom,
+    target_of_flex as target_of_flex,
+)
 from .load import (
     ContactLoads as ContactLoads,
     StepContacts as StepContacts,
@@ -57,9 +61,6 @@ from .rest_filter import (
 from .ripples import Impulse as Impulse, Ripples as Ripples
 from .soft import (
     SoftSurface as SoftSurface,
-    first_flex as first_flex,
-    first_skin as first_skin,
-    is_soft as is_soft,
     target_pose as target_pose,
 )
 from .solved_forces import (

@@ -18,6 +18,7 @@ from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.texels.thickness import half_thickness
 
+from .ids import GeomId
 from .model import CoupledModel
 from .suited import Extent, bearing_density
 
@@ -101,11 +102,11 @@ class AmplitudeCheck:
     Parameters
     ----------
     coupled : CoupledModel
-    waves : mapping of int to WaveSolver
-        By geom; see `waves_changed`.
+    waves : mapping of GeomId to WaveSolver
+        By target; see `waves_changed`.
     """
 
-    def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
+    def __init__(self, coupled: CoupledModel, waves: Mapping[GeomId, WaveSolver]) -> None:
         self._coupled = coupled
         self._watched = {geom: _WatchedTarget(solver) for geom, solver in waves.items()}
         self._steps = 0
@@ -117,15 +118,15 @@ class AmplitudeCheck:
                 self._warn(geom)
         self._steps += 1
 
-    def ignore(self, geom: int) -> None:
+    def ignore(self, geom: GeomId) -> None:
         """Give no warning of a geom."""
         self._watched.pop(geom, None)
 
-    def watches(self, geom: int) -> bool:
+    def watches(self, geom: GeomId) -> bool:
         """Whether a geom may still be warned of."""
         return geom in self._watched
 
-    def waves_changed(self, geom: int, waves: WaveSolver) -> None:
+    def waves_changed(self, geom: GeomId, waves: WaveSolver) -> None:
         """Go on with the new waves of a geom."""
         if geom in self._watched:
             watch = self._watched[geom]
@@ -140,7 +141,7 @@ class AmplitudeCheck:
             if watch.excess > 1:
                 self._warn(geom)
 
-    def _warn(self, geom: int) -> None:
+    def _warn(self, geom: GeomId) -> None:
         watch = self._watched.pop(geom)
         target = self._coupled.names[geom]
         advice = self._advice(geom, watch.waves, _DENSITY_MARGIN * watch.needed)
@@ -148,7 +149,7 @@ class AmplitudeCheck:
             f"the waves on geom {target!r} are {watch.what}; pictures show them limited. {advice}"
         )
 
-    def _advice(self, geom: int, waves: WaveSolver, factor: float) -> str:
+    def _advice(self, geom: GeomId, waves: WaveSolver, factor: float) -> str:
         """A material that would do, with a density higher by at least a factor."""
         material = waves.material
         values = {field.name: getattr(material, field.name) for field in _PRINTED_FIELDS}

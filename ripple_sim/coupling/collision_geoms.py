@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ripple_sim.errors import SceneError
 
 from .geoms import ByGeom, GeomKey, by_name, find_any, find_geom, geom_name
-from .soft import is_soft
+from .ids import GeomId, TargetId, geom_id, is_geom
 
 # Types of geoms without a size.
 ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
@@ -19,8 +19,8 @@ ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
 def named_collision_geoms(
     model: mujoco.MjModel, targets: Iterable[str], contacts: ByGeom[Sequence[GeomKey]]
-) -> dict[int, tuple[int, ...]]:
-    """Ids of the geoms that a user names to collide for targets, by the targets' ids.
+) -> dict[GeomId, tuple[GeomId, ...]]:
+    """Geoms that a user names to collide for targets, by target.
 
     Raises
     ------
@@ -32,11 +32,11 @@ def named_collision_geoms(
         raise SceneError(
             f"contacts is {contacts!r}; valid is a mapping of rippling geoms to lists of geoms"
         )
-    rippling = {find_any(model, name): name for name in targets}
-    solids_by_target = {}
+    rippling: dict[TargetId, str] = {find_any(model, name): name for name in targets}
+    solids_by_target: dict[GeomId, tuple[GeomId, ...]] = {}
     for name, keys in by_name(model, contacts, "contacts").items():
         target = find_any(model, name)
-        if is_soft(model, target):
+        if not is_geom(target, model):
             raise SceneError(
                 f"contacts names {name!r}, a flex or a skin, for which no geoms can be chosen: a "
                 "flex takes the contacts of its own vertices, a skin those of the bodies of its "
@@ -61,7 +61,7 @@ def named_collision_geoms(
     return solids_by_target
 
 
-def _check_named(model: mujoco.MjModel, target: int, name: str, geom: int) -> None:
+def _check_named(model: mujoco.MjModel, target: GeomId, name: str, geom: GeomId) -> None:
     """Refuse a geom on a body that moves against the target's body."""
     weld = model.body_weldid[model.geom_bodyid]
     if weld[geom] == weld[target]:
@@ -77,10 +77,10 @@ def _check_named(model: mujoco.MjModel, target: int, name: str, geom: int) -> No
 def find_collision_geoms(
     model: mujoco.MjModel,
     collides: NDArray[np.bool_],
-    targets: Iterable[int],
-    named: Mapping[int, Sequence[int]],
-) -> dict[int, tuple[int, ...]]:
-    """Geoms whose contacts load each target, by the target's geom id.
+    targets: Iterable[GeomId],
+    named: Mapping[GeomId, Sequence[GeomId]],
+) -> dict[GeomId, tuple[GeomId, ...]]:
+    """Geoms whose contacts load each target, by target.
 
     A target is loaded by the geoms that it names, and by itself where it collides. A target that
     neither collides nor names geoms takes the colliding geoms of its body, except planes, height
@@ -93,10 +93,9 @@ def find_collision_geoms(
     model : mujoco.MjModel
     collides : bool [ngeom]
         Whether a geom collides.
-    targets : iterable of int
-        Geom ids.
+    targets : iterable of GeomId
     named : mapping
-        Of some targets' ids to the ids that they name.
+        Of some targets to the geoms that they name.
     """
     targets = list(targets)
     # geoms that may collide for targets that name none
@@ -104,18 +103,18 @@ def find_collision_geoms(
     free[targets] = False
     for geoms in named.values():
         free[list(geoms)] = False
-    solids_by_target = {}
+    solids_by_target: dict[GeomId, tuple[GeomId, ...]] = {}
     for target in targets:
         own = (target,) if collides[target] else ()
         if own or target in named:
             solids_by_target[target] = tuple(dict.fromkeys((*own, *named.get(target, ()))))
         else:
             kin = _kin(model, target, free)
-            solids_by_target[target] = tuple(np.flatnonzero(kin).tolist())
+            solids_by_target[target] = tuple(map(geom_id, np.flatnonzero(kin).tolist()))
     return solids_by_target
 
 
-def _kin(model: mujoco.MjModel, target: int, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _kin(model: mujoco.MjModel, target: GeomId, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which of the free geoms, [ngeom], collide for a target that names none."""
     body = model.geom_bodyid[target]
     kin = free & (model.geom_bodyid == body)
@@ -126,7 +125,7 @@ def _kin(model: mujoco.MjModel, target: int, free: NDArray[np.bool_]) -> NDArray
     return kin if weld[target] else kin & _in_box(model, target)
 
 
-def _in_box(model: mujoco.MjModel, target: int) -> NDArray[np.bool_]:
+def _in_box(model: mujoco.MjModel, target: GeomId) -> NDArray[np.bool_]:
     """Whether the middles of geoms, [ngeom], lie in the box around a target."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -7,7 +7,7 @@ place of a target are handed to it, at places on its surface.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -18,6 +18,7 @@ from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 
 from .flex_contacts import FlexContacts
+from .ids import ColliderId, GeomId, TargetId, is_geom
 from .model import CoupledModel
 from .solver_balance import SolverBalance
 from .target_mesh import target_mesh
@@ -65,10 +66,19 @@ class Contacts(NamedTuple):
             self.others[which], self.points[which], self.forces[which], self.normals[which]
         )
 
-    def split(self, ids: Ints) -> dict[int, Contacts]:
-        """The contacts of each id, from the ids of all, [k], ascending."""
+    def by_other(self) -> dict[ColliderId, Contacts]:
+        """The contacts with each collider that touches."""
+        return {ColliderId(other): contacts for other, contacts in self._runs(self.others)}
+
+    def by_target(self, targets: Ints) -> dict[TargetId, Contacts]:
+        """The contacts of each target, from the targets of all contacts, [k], ascending."""
+        return {TargetId(ColliderId(target)): contacts for target, contacts in self._runs(targets)}
+
+    def _runs(self, ids: Ints) -> Iterator[tuple[int, Contacts]]:
+        """Each of some ids, [k], ascending, and its contacts."""
         bounds = [*first_rows(ids).tolist(), len(ids)]
-        return {int(ids[a]): self.rows(slice(a, b)) for a, b in itertools.pairwise(bounds)}
+        for first, last in itertools.pairwise(bounds):
+            yield int(ids[first]), self.rows(slice(first, last))
 
     @classmethod
     def together(cls, parts: Sequence[Contacts]) -> Contacts:
@@ -331,20 +341,21 @@ class ContactReader:
     ----------
     coupled : CoupledModel
     atlases : mapping
-        Geom id of every target to its atlas, in the geom's frame [m].
+        Every target to its atlas, in the target's frame [m].
     """
 
-    def __init__(self, coupled: CoupledModel, atlases: Mapping[int, Atlas]) -> None:
+    def __init__(self, coupled: CoupledModel, atlases: Mapping[TargetId, Atlas]) -> None:
         self._coupled = coupled
-        self._atlases = {
-            target: atlas for target, atlas in atlases.items() if target not in coupled.soft
-        }
+        self._atlases: dict[GeomId, Atlas] = {}
+        for target, atlas in atlases.items():
+            if is_geom(target, coupled.model):
+                self._atlases[target] = atlas
         # targets of each geom that collides for another geom, or of a target with convex parts
-        self._targets_of: dict[int, list[int]] = {}
-        for target in self._atlases:
-            for geom in coupled.collision_geoms(target):
-                if geom != target or geom in coupled.convex_colliders:
-                    self._targets_of.setdefault(geom, []).append(target)
+        self._targets_of: dict[GeomId, list[GeomId]] = {}
+        for rigid_target in self._atlases:
+            for geom in coupled.collision_geoms(rigid_target):
+                if geom != rigid_target or geom in coupled.convex_colliders:
+                    self._targets_of.setdefault(geom, []).append(rigid_target)
         meshes = {target: atlas.mesh for target, atlas in self._atlases.items()}
         for geom in coupled.flex_colliders.keys() & self._targets_of.keys():
             meshes[geom] = target_mesh(coupled.model, geom)
@@ -356,13 +367,13 @@ class ContactReader:
         if self._flexes is not None:
             self._is_read[self._flexes.is_target] = False
 
-    def read(self, data: mujoco.MjData) -> dict[int, Contacts]:
-        """Contacts of each target that is touched, by geom id.
+    def read(self, data: mujoco.MjData) -> dict[TargetId, Contacts]:
+        """Contacts of each target that is touched.
 
         Where two targets touch, their contacts are reported for each of them. A geom that sticks to
         a target and pulls more than it pushes has negative forces, at all contacts of the pair.
         """
-        contacts: dict[int, Contacts] = {}
+        contacts: dict[TargetId, Contacts] = {}
         if data.ncon:
             colliders = collider_ids(self._coupled, data)
             contacts = self._geom_contacts(data, colliders) | self._flex_contacts(data, colliders)
@@ -374,7 +385,7 @@ class ContactReader:
 
     def _geom_contacts(
         self, data: mujoco.MjData, colliders: NDArray[np.integer]
-    ) -> dict[int, Contacts]:
+    ) -> dict[TargetId, Contacts]:
         """Contacts of what collides without a flex collider, by its own id, in ascending order.
 
         Triangles of a flex that touches push sideways in pairs: the forces of such a pair are
@@ -403,7 +414,7 @@ class ContactReader:
             )
             touching = touching._replace(forces=factors * touching.forces).rows(factors != 0)
             targets = targets[factors != 0]
-        return touching.split(targets)
+        return touching.by_target(targets)
 
     def _pair_factors(self, targets: Ints, touching: Contacts, pulls: Floats | None) -> Floats:
         """Factors, [k], after which the forces of each pair add up to the force that it bears.
@@ -432,7 +443,7 @@ class ContactReader:
 
     def _flex_contacts(
         self, data: mujoco.MjData, colliders: NDArray[np.integer]
-    ) -> dict[int, Contacts]:
+    ) -> dict[TargetId, Contacts]:
         """Contacts of targets with a flex collider, by the target's id."""
         model = self._coupled.model
         flexes = self._flexes
@@ -447,9 +458,9 @@ class ContactReader:
         friction = friction_forces(model, data, contacts)
         forces = np.column_stack([normal, friction])
         kept, *loads = flexes.loads(data, *rows, first_rows(targets, others), forces)
-        return Contacts(others[kept], *loads).split(targets[kept])
+        return Contacts(others[kept], *loads).by_target(targets[kept])
 
-    def _hand_over(self, data: mujoco.MjData, contacts: dict[int, Contacts]) -> None:
+    def _hand_over(self, data: mujoco.MjData, contacts: dict[TargetId, Contacts]) -> None:
         """Hand the contacts of each collision geom to its target, or to the nearest of several."""
         geoms = sorted(self._targets_of.keys() & contacts.keys())
         of_geoms = {geom: contacts.pop(geom) for geom in geoms}
@@ -466,7 +477,7 @@ class ContactReader:
                     on_target = Contacts.together([contacts[target], on_target])
                 contacts[target] = on_target
 
-    def _places_on(self, data: mujoco.MjData, target: int, contacts: Contacts) -> Floats:
+    def _places_on(self, data: mujoco.MjData, target: GeomId, contacts: Contacts) -> Floats:
         """Points on a target's surface nearest to contacts that they face, in the world [m]."""
         position = data.geom_xpos[target]
         rotation = data.geom_xmat[target].reshape(3, 3)

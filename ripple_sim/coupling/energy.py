@@ -20,6 +20,7 @@ import numpy as np
 from ripple_sim.solver.kernel import Floats
 
 from .contacts import adhesion, is_pyramidal
+from .ids import ColliderId, TargetId
 
 _INTEGRATORS = mujoco.mjtIntegrator
 
@@ -50,8 +51,10 @@ _WORK_ROUND_OFF = 1e-6
 # rows do not push.
 _OPEN_ACCELERATION = -1e10
 
-# Target, and the collider that touches it, by their ids.
-Key = tuple[int, int]
+# A target, and the collider that touches it.
+Key = tuple[TargetId, ColliderId]
+# The two of a pair in the order of their ids: two targets that touch each other are one account.
+Purse = tuple[ColliderId, ColliderId]
 
 
 class Energy(NamedTuple):
@@ -206,7 +209,7 @@ class Pair(NamedTuple):
     mean_mobility: float
 
     @property
-    def purse(self) -> Key:
+    def purse(self) -> Purse:
         """The pair's account; two targets that touch each other, which are two pairs, share one."""
         return min(self.key), max(self.key)
 
@@ -345,7 +348,7 @@ class ContactProblem:
         slip = data.efc_vel[rows.normal] - sum(pair.start for pair in pairs)
         self._aref[rows.normal] = free - damping * slip - stiffness * part * gap
 
-    def solve(self, paid: Mapping[Key, float]) -> dict[Key, float]:
+    def solve(self, paid: Mapping[Purse, float]) -> dict[Key, float]:
         """Force on each target in a pair [N], which every pair can afford.
 
         Parameters
@@ -476,7 +479,7 @@ class ContactProblem:
                 greatest = max(greatest, pair.mobility * abs(total[pair.key]))
         return greatest_difference <= _SHARING_TOLERANCE * greatest
 
-    def _affordable(self, force: Floats, paid: Mapping[Key, float]) -> dict[Key, float]:
+    def _affordable(self, force: Floats, paid: Mapping[Purse, float]) -> dict[Purse, float]:
         """Shares of their forces that pairs can afford, by purse, where they cannot afford all.
 
         The work of a share s of a force is linear s + square s^2: the first part against the
@@ -485,8 +488,8 @@ class ContactProblem:
         data = self._data
         dt = self._dt
         total = self._total(force)
-        linear = defaultdict[Key, float](float)
-        square = defaultdict[Key, float](float)
+        linear = defaultdict[Purse, float](float)
+        square = defaultdict[Purse, float](float)
         for pair in self._pairs.values():
             on_pair = total[pair.key]
             added = pair.mean_mobility * dt

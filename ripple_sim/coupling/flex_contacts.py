@@ -13,6 +13,7 @@ from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 
 from .geoms import rotation_in_body
+from .ids import FlexId, GeomId
 from .model import CoupledModel
 
 # Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push
@@ -50,7 +51,7 @@ class FlexContacts:
         By collider id, whether it is a target with a flex collider.
     """
 
-    def __init__(self, coupled: CoupledModel, meshes: Mapping[int, Mesh]) -> None:
+    def __init__(self, coupled: CoupledModel, meshes: Mapping[GeomId, Mesh]) -> None:
         model = coupled.model
         flexes = coupled.flex_colliders
         ids = len(coupled.owners)
@@ -179,7 +180,7 @@ class FlexContacts:
 
 
 def _outward_normals(
-    model: mujoco.MjModel, geom: int, flex: int, mesh: Mesh
+    model: mujoco.MjModel, geom: GeomId, flex: FlexId, mesh: Mesh
 ) -> NDArray[np.float64]:
     """Outward unit normals of a flex collider's triangles in the geom's frame, [m, 3]."""
     begin = model.flex_elemdataadr[flex]

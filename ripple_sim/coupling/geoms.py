@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import shown
 
-from .soft import find_soft, is_soft, soft_name, soft_names
+from .ids import GeomId, TargetId, geom_id, is_geom
+from .soft import find_soft, soft_name, soft_names
 
 # Types of geoms that can ripple, by MuJoCo's number, with MuJoCo's name in the MJCF.
 TARGET_TYPES = {
@@ -34,7 +35,7 @@ Value = TypeVar("Value")
 ByGeom = Mapping[str, Value] | Mapping[int, Value] | Mapping[GeomKey, Value]
 
 
-def geom_name(model: mujoco.MjModel, geom: int) -> str:
+def geom_name(model: mujoco.MjModel, geom: GeomId) -> str:
     """Name of a geom.
 
     A geom without a name is called "body/index", by its index among the geoms of its body; or
@@ -51,24 +52,24 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
     return place if body_name and not taken else f"geom {geom}"
 
 
-def find_geom(model: mujoco.MjModel, key: GeomKey) -> int:
+def find_geom(model: mujoco.MjModel, key: GeomKey) -> GeomId:
     """Id of a geom, by its name, "body/index" (also where it has a name), "geom <id>", or its id.
 
     Raises `SceneError` if there is no such geom.
     """
     if isinstance(key, (int, np.integer)) and 0 <= key < model.ngeom:
-        return int(key)
+        return geom_id(int(key))
     if isinstance(key, str):
         geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, key)
         if geom >= 0:
-            return int(geom)
+            return GeomId(geom)
         body_name, slash, index = key.rpartition("/")
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body_name) if slash else -1
         if body >= 0 and index.isdecimal() and int(index) < model.body_geomnum[body]:
-            return int(model.body_geomadr[body]) + int(index)
-    names = [geom_name(model, geom) for geom in range(model.ngeom)]
+            return geom_id(int(model.body_geomadr[body]) + int(index))
+    names = [geom_name(model, geom_id(i)) for i in range(model.ngeom)]
     if isinstance(key, str) and key in names:
-        return names.index(key)
+        return geom_id(names.index(key))
     listed = ", ".join(map(repr, names[:_MAX_LISTED])) or "none"
     if model.ngeom > _MAX_LISTED:
         listed += f" and {model.ngeom - _MAX_LISTED} more"
@@ -80,24 +81,24 @@ def find_geom(model: mujoco.MjModel, key: GeomKey) -> int:
     )
 
 
-def target_name(model: mujoco.MjModel, target: int) -> str:
+def target_name(model: mujoco.MjModel, target: TargetId) -> str:
     """Name of a geom, see `geom_name`, or of a soft target."""
-    return soft_name(model, target) if is_soft(model, target) else geom_name(model, target)
+    return geom_name(model, target) if is_geom(target, model) else soft_name(model, target)
 
 
-def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
+def find_target(model: mujoco.MjModel, key: GeomKey) -> TargetId:
     """Id of a target: a geom, see `find_geom`, or a flex or a skin, see `find_soft`.
 
     Raises `SceneError` if there is nothing of that name, or a geom's type has no closed surface.
     """
-    geom = find_any(model, key)
-    if not is_soft(model, geom) and int(model.geom_type[geom]) not in TARGET_TYPES:
-        kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
+    target = find_any(model, key)
+    if is_geom(target, model) and int(model.geom_type[target]) not in TARGET_TYPES:
+        kind = mujoco.mjtGeom(model.geom_type[target]).name.removeprefix("mjGEOM_").lower()
         raise SceneError(
             f"geom {key!r} is a {kind}, which cannot ripple; valid are "
             f"{', '.join(TARGET_TYPES.values())}"
         )
-    return geom
+    return target
 
 
 def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str, Value]:
@@ -118,28 +119,30 @@ def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str
     return value_by_name
 
 
-def find_any(model: mujoco.MjModel, key: GeomKey) -> int:
+def find_any(model: mujoco.MjModel, key: GeomKey) -> TargetId:
     """Id of a geom, whatever its type, or else of the flex or skin of a name.
 
     Raises `SceneError` if there is nothing of that name.
     """
     soft = find_soft(model, key)
-    if soft >= 0 and mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, str(key)) < 0:
+    if soft is not None and mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, str(key)) < 0:
         return soft
     return find_geom(model, key)
 
 
-def to_body(model: mujoco.MjModel, geom: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_body(
+    model: mujoco.MjModel, target: TargetId, points: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Points [..., 3] [m] of a target's atlas in the frame of the geom's body.
 
     Points of a flex or a skin are in the world, and stay.
     """
-    if is_soft(model, geom):
-        return points
-    return points @ rotation_in_body(model, geom).T + model.geom_pos[geom]
+    if is_geom(target, model):
+        return points @ rotation_in_body(model, target).T + model.geom_pos[target]
+    return points
 
 
-def rotation_in_body(model: mujoco.MjModel, geom: int) -> NDArray[np.float64]:
+def rotation_in_body(model: mujoco.MjModel, geom: GeomId) -> NDArray[np.float64]:
     """Rotation [3, 3] of a geom in the frame of its body, with its axes as columns."""
     rotation = np.zeros(9)
     mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])

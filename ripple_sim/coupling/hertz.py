@@ -28,6 +28,7 @@ from ripple_sim.solver.waves.load import StepLoad
 from .contacts import Contacts, collider_ids, normal_rows
 from .energy import impedance
 from .geoms import find_any
+from .ids import ColliderId, GeomId, TargetId, is_geom
 from .model import CoupledModel
 from .target import Target
 
@@ -56,12 +57,12 @@ _MIN_EXTENT_SHARE = 1e-6
 _HERTZ_TIME_FACTOR = 2.868
 
 
-def hertz_moduli(model: mujoco.MjModel, targets: Mapping[str, Target]) -> dict[int, float]:
-    """E* [Pa] of the targets whose hits have Hertz's pulse, by geom id.
+def hertz_moduli(model: mujoco.MjModel, targets: Mapping[str, Target]) -> dict[TargetId, float]:
+    """E* [Pa] of the targets whose hits have Hertz's pulse.
 
     Raises `SceneError` for a pulse that is unknown, or a modulus that is missing or not positive.
     """
-    moduli = {}
+    moduli: dict[TargetId, float] = {}
     for name, target in targets.items():
         if target.pulse not in PULSES:
             raise SceneError(
@@ -244,7 +245,7 @@ def _rebound_speed(
     return max(-speed, 0.0)
 
 
-def surface_bend(model: mujoco.MjModel, geom: int, normal: Floats) -> NDArray[np.float64] | None:
+def surface_bend(model: mujoco.MjModel, geom: GeomId, normal: Floats) -> NDArray[np.float64] | None:
     """How the normal of a round geom turns along its surface, in the geom's frame, [3, 3] [1/m].
 
     It holds where the surface has the given normal [3]. Round are spheres, ellipsoids, capsules,
@@ -300,13 +301,12 @@ class Hits:
     Parameters
     ----------
     coupled : CoupledModel
-    target : int
-        Geom id.
+    target : TargetId
     modulus : float
         E* [Pa].
     """
 
-    def __init__(self, coupled: CoupledModel, target: int, modulus: float) -> None:
+    def __init__(self, coupled: CoupledModel, target: TargetId, modulus: float) -> None:
         self._coupled = coupled
         self._target = target
         self._modulus = modulus
@@ -339,7 +339,7 @@ class Hits:
         float
             Impulse that the target gets by the pulse [N s], positive inwards.
         """
-        other = int(pair.others[0])
+        other = ColliderId(int(pair.others[0]))
         hit = foreseen(self._coupled.model, data, self._contacts_with(data, other))
         if hit is None or not shares.any():
             return 0.0
@@ -364,14 +364,17 @@ class Hits:
         self._pulses = [pulse for pulse in older if pulse.age < _OVER * pulse.duration]
         return PulsedLoad(load, pulses)
 
-    def _contacts_with(self, data: mujoco.MjData, other: int) -> Ints:
+    def _contacts_with(self, data: mujoco.MjData, other: ColliderId) -> Ints:
         """MuJoCo's contacts of a collider with the target that carry a force, [k]."""
         colliders = collider_ids(self._coupled, data)
-        ours = np.isin(colliders, [self._target, *self._coupled.collision_geoms(self._target)])
+        own: list[ColliderId] = [self._target]
+        if is_geom(self._target, self._coupled.model):
+            own += self._coupled.collision_geoms(self._target)
+        ours = np.isin(colliders, own)
         of_pair = (ours[:, ::-1] & (colliders == other)).any(axis=1)
         return (of_pair & (data.contact.efc_address >= 0)).nonzero()[0]
 
-    def _warn(self, other: int, reason: str) -> None:
+    def _warn(self, other: ColliderId, reason: str) -> None:
         """Warn once that hits keep MuJoCo's pulse for this reason."""
         if reason in self._warned_of:
             return
@@ -386,11 +389,11 @@ class Hits:
         )
 
     def _radius(
-        self, data: mujoco.MjData, atlas: Atlas, pair: Contacts, texels: Ints, other: int
+        self, data: mujoco.MjData, atlas: Atlas, pair: Contacts, texels: Ints, other: ColliderId
     ) -> float | str:
         """Radius of a ball on a plane with the same gap as the pair [m], or why there is none."""
         coupled = self._coupled
-        if self._target in coupled.soft or other >= coupled.model.ngeom:
+        if not (is_geom(self._target, coupled.model) and is_geom(other, coupled.model)):
             return "Hertz's law is one of rigid geoms, not of flexes and skins"
         shares = pair.forces / pair.forces.sum()
         normal = shares @ pair.normals

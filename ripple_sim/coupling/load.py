@@ -22,7 +22,9 @@ from ripple_sim.solver.waves.load import StepLoad
 
 from .contacts import ContactReader, Contacts, first_rows
 from .easing import Easing
+from .energy import Key
 from .hertz import Hits
+from .ids import TargetId, is_geom
 from .model import CoupledModel
 from .patches import Footprints, corners, load_points
 from .rest_filter import DEFAULT_TIME_CONSTANT, NO_FORCES, RestFilter, TexelForces
@@ -46,13 +48,15 @@ class SleepingContacts:
     def __init__(self, coupled: CoupledModel) -> None:
         self._coupled = coupled
         # by target and other: the latest contacts, and their summed forces in the latest steps [N]
-        self._pairs: dict[tuple[int, int], tuple[Contacts, collections.deque[float]]] = {}
+        self._pairs: dict[Key, tuple[Contacts, collections.deque[float]]] = {}
 
-    def add(self, data: mujoco.MjData, contacts: Mapping[int, Contacts]) -> dict[int, Contacts]:
-        """Contacts of each target, by geom id, with those of sleeping bodies."""
-        present: dict[tuple[int, int], Contacts] = {}
+    def add(
+        self, data: mujoco.MjData, contacts: Mapping[TargetId, Contacts]
+    ) -> dict[TargetId, Contacts]:
+        """Contacts of each target, with those of sleeping bodies."""
+        present: dict[Key, Contacts] = {}
         for target, on_target in contacts.items():
-            for other, pair in on_target.split(on_target.others).items():
+            for other, pair in on_target.by_other().items():
                 present[target, other] = pair
         all_contacts = dict(contacts)
         for key, (pair, sums) in list(self._pairs.items()):
@@ -154,7 +158,7 @@ class StepContacts(NamedTuple):
 
     Attributes
     ----------
-    target : int
+    target : TargetId
     position : float64 [3]
         Of the target in the world [m].
     rotation : float64 [3, 3]
@@ -175,7 +179,7 @@ class StepContacts(NamedTuple):
         The forces on the texels, which the rest filter takes.
     """
 
-    target: int
+    target: TargetId
     position: Floats
     rotation: Floats
     contacts: Contacts
@@ -257,8 +261,7 @@ class TargetLoad:
     ----------
     waves : WaveSolver
         Of the target.
-    target : int
-        Geom id.
+    target : TargetId
     radii : float64 [c]
         Footprint radius of each collider [m]: of a pair the smaller one counts.
     convex : bool [c]
@@ -274,7 +277,7 @@ class TargetLoad:
     def __init__(
         self,
         waves: WaveSolver,
-        target: int,
+        target: TargetId,
         radii: NDArray[np.float64],
         convex: NDArray[np.bool_],
         time_constant: float = DEFAULT_TIME_CONSTANT,
@@ -450,11 +453,11 @@ class ContactLoads:
     ----------
     coupled : CoupledModel
     waves : mapping
-        Geom id of every target to its waves. `waves_changed` and `clear` look at the mapping again.
+        Every target to its waves. `waves_changed` and `clear` look at the mapping again.
     hits : mapping, optional
-        Pulses by geom id, for targets whose hits have the pulse of Hertz's law.
+        Pulses by target, for targets whose hits have the pulse of Hertz's law.
     easings : mapping, optional
-        Easing by geom id, for targets that take up only a share of forces.
+        Easing by target, for targets that take up only a share of forces.
 
     Attributes
     ----------
@@ -465,9 +468,9 @@ class ContactLoads:
     def __init__(
         self,
         coupled: CoupledModel,
-        waves: Mapping[int, WaveSolver],
-        hits: Mapping[int, Hits] | None = None,
-        easings: Mapping[int, Easing] | None = None,
+        waves: Mapping[TargetId, WaveSolver],
+        hits: Mapping[TargetId, Hits] | None = None,
+        easings: Mapping[TargetId, Easing] | None = None,
     ) -> None:
         self._coupled = coupled
         self._waves = waves
@@ -487,26 +490,26 @@ class ContactLoads:
             easing.clear()
         self.skip()
 
-    def _target_load(self, geom: int) -> TargetLoad:
+    def _target_load(self, target: TargetId) -> TargetLoad:
         coupled = self._coupled
         # a flex has a contact at each of its vertices: nothing touches between them
-        convex = coupled.convex & (geom not in coupled.soft)
+        convex = coupled.convex & is_geom(target, coupled.model)
         return TargetLoad(
-            self._waves[geom],
-            geom,
+            self._waves[target],
+            target,
             coupled.footprint_radii,
             convex,
-            self._time_constant(geom),
-            self._hits.get(geom),
-            self._easings.get(geom),
+            self._time_constant(target),
+            self._hits.get(target),
+            self._easings.get(target),
         )
 
-    def _time_constant(self, geom: int) -> float:
+    def _time_constant(self, target: TargetId) -> float:
         """Time constant of contacts with a target, from its `solref` [s]."""
-        surface = self._coupled.soft.get(geom)
+        surface = self._coupled.soft.get(target)
         constant = DEFAULT_TIME_CONSTANT
         if surface is None:
-            constant = float(self._coupled.solref[geom, 0])
+            constant = float(self._coupled.solref[target, 0])
         elif surface.flex >= 0:
             constant = float(self._coupled.model.flex_solref[surface.flex, 0])
         if constant <= 0:  # -omega^2 of a spring: 1 / omega stands for a time constant
@@ -518,41 +521,41 @@ class ContactLoads:
         self.since_skip: list[StepContacts] = []
         self._impulses: list[Impulse] | None = None
 
-    def waves_changed(self, geom: int) -> None:
+    def waves_changed(self, target: TargetId) -> None:
         """Go on with the new waves of a target."""
-        self._targets[geom].set_waves(self._waves[geom])
+        self._targets[target].set_waves(self._waves[target])
 
-    def take_up_all(self, geom: int) -> None:
+    def take_up_all(self, target: TargetId) -> None:
         """Take up all of every force on a target from now on."""
-        self._easings.pop(geom, None)
-        self._targets[geom].take_up_all()
+        self._easings.pop(target, None)
+        self._targets[target].take_up_all()
 
-    def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, StepLoad]:
+    def loads(self, data: mujoco.MjData, elapsed: float) -> dict[TargetId, StepLoad]:
         """Load on each target over a time [s], from the contact forces of MuJoCo's latest step.
 
         Bodies that sleep press as before.
         """
-        loads: dict[int, StepLoad] = {}
+        loads: dict[TargetId, StepLoad] = {}
         self._impulses = None
         self._timestep = self._coupled.model.opt.timestep
         contacts = self._contacts.read(data)
         if self._coupled.model.opt.enableflags & SLEEP:
             contacts = self._with_sleeping(data, contacts)
-        for geom, target in self._targets.items():
-            if geom not in contacts:
-                loads[geom] = target.given(elapsed)
+        for target, target_load in self._targets.items():
+            if target not in contacts:
+                loads[target] = target_load.given(elapsed)
                 continue
-            pose = target_pose(data, geom)
-            loads[geom], touches = target.touched(
-                contacts[geom], pose, self._timestep, elapsed, data
+            pose = target_pose(data, target)
+            loads[target], touches = target_load.touched(
+                contacts[target], pose, self._timestep, elapsed, data
             )
             self.since_skip.append(touches)
         return loads
 
     def _with_sleeping(
-        self, data: mujoco.MjData, contacts: dict[int, Contacts]
-    ) -> dict[int, Contacts]:
-        """Contacts of each target, by geom id, with those of sleeping bodies."""
+        self, data: mujoco.MjData, contacts: dict[TargetId, Contacts]
+    ) -> dict[TargetId, Contacts]:
+        """Contacts of each target, with those of sleeping bodies."""
         if self._sleeping is None:
             # the contacts of bodies that sleep from the beginning were never seen
             self._sleeping = SleepingContacts(self._coupled)

@@ -17,7 +17,8 @@ from ripple_sim.solver import Mesh
 
 from .collision_geoms import ENDLESS, find_collision_geoms
 from .geoms import geom_name
-from .soft import SoftSurface, is_soft, soft_names
+from .ids import ColliderId, FlexId, GeomId, TargetId, geom_id, is_geom
+from .soft import SoftSurface, soft_names
 
 # The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.
 SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))
@@ -45,49 +46,54 @@ def part_name(geom: str, index: int) -> str:
     return f"{geom}#{index}"
 
 
-def find_convex_colliders(model: mujoco.MjModel) -> dict[int, list[int]]:
+def find_convex_colliders(model: mujoco.MjModel) -> dict[GeomId, list[GeomId]]:
     """Convex colliders by the id of their geom, which does not collide itself.
 
     They are mesh geoms on its body, called by its name, "#" and a number.
     """
-    parts_by_geom: dict[int, list[int]] = {}
-    for part in np.flatnonzero(model.geom_type == _MESH).tolist():
+    parts_by_geom: dict[GeomId, list[GeomId]] = {}
+    for part in map(geom_id, np.flatnonzero(model.geom_type == _MESH).tolist()):
         geom = _whole_geom(model, part)
-        if geom >= 0 and not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+        if geom is None:
+            continue
+        if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
             parts_by_geom.setdefault(geom, []).append(part)
     return parts_by_geom
 
 
-def _whole_geom(model: mujoco.MjModel, part: int) -> int:
-    """The geom of which another one is a convex part by its name and body, or -1."""
+def _whole_geom(model: mujoco.MjModel, part: GeomId) -> GeomId | None:
+    """The geom of which another one is a convex part by its name and body, if there is one."""
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, part) or ""
     whole_name, mark, number = name.rpartition("#")
     if not mark or not number.isdecimal():
-        return -1
-    geom = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, whole_name))
+        return None
+    geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, whole_name)
     if geom < 0 or model.geom_type[geom] not in _TYPES_WITH_PARTS:
-        return -1
-    return geom if model.geom_bodyid[geom] == model.geom_bodyid[part] else -1
+        return None
+    on_same_body = model.geom_bodyid[geom] == model.geom_bodyid[part]
+    return GeomId(geom) if on_same_body else None
 
 
-def find_flex_colliders(model: mujoco.MjModel) -> dict[int, int]:
+def find_flex_colliders(model: mujoco.MjModel) -> dict[GeomId, FlexId]:
     """Flex that collides in place of a geom, by geom id.
 
     It is rigid, of triangles, and has the geom's name and body.
     """
-    flex_by_geom = {}
+    flex_by_geom: dict[GeomId, FlexId] = {}
     for flex in range(model.nflex):
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex)
-        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) if name else -1
+        if not name:
+            continue
+        geom = geom_id(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name))
         if geom < 0 or model.flex_dim[flex] != 2 or not model.flex_rigid[flex]:
             continue
         first_vertex = model.flex_vertadr[flex]
         if model.flex_vertbodyid[first_vertex] == model.geom_bodyid[geom]:
-            flex_by_geom[geom] = flex
+            flex_by_geom[geom] = FlexId(flex)
     return flex_by_geom
 
 
-def flex_thickness(model: mujoco.MjModel, flex: int) -> float:
+def flex_thickness(model: mujoco.MjModel, flex: FlexId) -> float:
     """Distance from its triangles at which a flex holds other geoms off [m]."""
     return float(model.flex_margin[flex] + model.flex_radius[flex])
 
@@ -117,17 +123,14 @@ class CoupledModel:
     flex each vertex is a collider. A target may have collision geoms, whose contacts load it; see
     `find_collision_geoms`.
 
-    There are c collider ids. First come the ids of the geoms, then one id for each vertex of a
-    flex, then one for each flex and each skin. A flex or a skin that ripples touches as a whole,
-    under its own id, which is also its target id; see `find_soft`.
+    There are c collider ids, see `ids`. A flex or a skin that ripples touches as a whole.
 
     Parameters
     ----------
     model : mujoco.MjModel
-    targets : iterable of int
-        Target ids: of geoms, flexes and skins.
+    targets : iterable of TargetId
     named : mapping, optional
-        Target id to the ids of the collision geoms that the user names.
+        Geom that is a target to the collision geoms that the user names for it.
 
     Attributes
     ----------
@@ -138,10 +141,10 @@ class CoupledModel:
         Index among the names of the geom, flex or skin that a collider is, or is a vertex of.
     bodies : int64 [c]
         The body of each collider; -1 for vertices between several bodies.
-    flex_colliders : dict of int to int
-        Geom id to the id of its flex collider.
-    convex_colliders : dict of int to list of int
-        Geom id to the ids of its convex colliders.
+    flex_colliders : dict of GeomId to FlexId
+        Geom to its flex collider.
+    convex_colliders : dict of GeomId to list of GeomId
+        Geom to its convex colliders.
     has_flex : bool [c]
         Whether a geom collides through a flex.
     extents : float64 [c]
@@ -156,8 +159,8 @@ class CoupledModel:
         Footprint radius of a contact with each collider [m]; of a pair the smaller one counts.
     convex : bool [c]
         Whether a collider that touches at two points touches between them too.
-    soft : dict of int to SoftSurface
-        The flexes and skins among the targets, by target id.
+    soft : dict of TargetId to SoftSurface
+        The flexes and skins among the targets.
     of_geom : int64 [ngeom]
         Id of the geom, flex or skin that a geom collides for, or its own.
     of_flex : int64 [nflex + 1]
@@ -168,11 +171,11 @@ class CoupledModel:
     def __init__(
         self,
         model: mujoco.MjModel,
-        targets: Iterable[int] = (),
-        named: Mapping[int, Sequence[int]] | None = None,
+        targets: Iterable[TargetId] = (),
+        named: Mapping[GeomId, Sequence[GeomId]] | None = None,
     ) -> None:
         self.model = model
-        geoms = range(model.ngeom)
+        geoms = [geom_id(i) for i in range(model.ngeom)]
         soft_count = model.nflex + model.nskin
         # the flex of each vertex of a flex
         vertex_flexes = np.repeat(np.arange(model.nflex), model.flex_vertnum)
@@ -204,13 +207,13 @@ class CoupledModel:
         self.convex = np.concatenate([convex, never])
         targets = list(targets)
         self.soft = {
-            target: SoftSurface(model, target) for target in targets if is_soft(model, target)
+            target: SoftSurface(model, target) for target in targets if not is_geom(target, model)
         }
         for target, surface in self.soft.items():
             self.footprint_radii[target] = _vertex_spacing(surface.mesh)
-        geoms_alone = [target for target in targets if target not in self.soft]
+        rigid_targets = [target for target in targets if is_geom(target, model)]
         self._collision_geoms = find_collision_geoms(
-            model, self._collides, geoms_alone, named or {}
+            model, self._collides, rigid_targets, named or {}
         )
         self.of_geom = np.arange(model.ngeom)
         self.of_flex = np.full(model.nflex + 1, -1)
@@ -248,11 +251,11 @@ class CoupledModel:
             if surface.flex >= 0:
                 self.of_flex[surface.flex] = target
 
-    def collision_geoms(self, geom: int) -> tuple[int, ...]:
+    def collision_geoms(self, geom: GeomId) -> tuple[GeomId, ...]:
         """Geoms whose contacts load this one: the geoms that collide for a target, or itself."""
         return self._collision_geoms.get(geom, (geom,))
 
-    def are_still(self, data: mujoco.MjData, colliders: Sequence[int]) -> bool:
+    def are_still(self, data: mujoco.MjData, colliders: Sequence[ColliderId]) -> bool:
         """Whether all colliders sleep or are static, so that they press as before.
 
         Vertices between several bodies never sleep.
@@ -260,7 +263,7 @@ class CoupledModel:
         bodies = self.bodies[list(colliders)]
         return bool((bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all())
 
-    def can_collide(self, geom: int) -> NDArray[np.bool_]:
+    def can_collide(self, geom: GeomId) -> NDArray[np.bool_]:
         """Geoms, [ngeom], that MuJoCo may collide with this one, or with geoms that collide for it.
 
         Explicit pairs count too. The geoms are on bodies that are not welded to this geom's body.
@@ -275,14 +278,14 @@ class CoupledModel:
             can[model.pair_geom1[model.pair_geom2 == solid]] = True
         return can & self._apart(geom)
 
-    def out_of_touch(self, geom: int) -> bool:
+    def out_of_touch(self, geom: GeomId) -> bool:
         """Whether geoms or flexes collide in the model, but none of them can touch this geom."""
         if self.can_collide(geom).any() or len(self.soft_flexes(geom)):
             return False
         others = self._collides & self._apart(geom)
         return bool(len(self._soft_flexes) or others.any())
 
-    def soft_flexes(self, geom: int) -> NDArray[np.int64]:
+    def soft_flexes(self, geom: GeomId) -> NDArray[np.int64]:
         """Flexes that MuJoCo collides with geoms that collide for this one; no flex colliders."""
         model = self.model
         soft = self._soft_flexes
@@ -292,7 +295,7 @@ class CoupledModel:
         meets = (self._contype[solids] & affinities | types & self._conaffinity[solids]) != 0
         return soft[meets.any(axis=1)]
 
-    def _apart(self, geom: int) -> NDArray[np.bool_]:
+    def _apart(self, geom: GeomId) -> NDArray[np.bool_]:
         """Geoms, [ngeom], on bodies not welded to that of this one."""
         weld = self.model.body_weldid[self.model.geom_bodyid]
         return np.asarray(weld != weld[geom])

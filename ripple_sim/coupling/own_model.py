@@ -14,6 +14,7 @@ import numpy as np
 from ripple_sim.errors import SceneError
 
 from .geoms import target_name
+from .ids import TargetId
 
 # Counts by which messages tell models apart.
 _SIZES = ("nq", "nv", "nu", "nbody", "ngeom")
@@ -123,17 +124,19 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
     return found
 
 
-def check_targets(model: mujoco.MjModel, other: mujoco.MjModel, targets: Mapping[str, int]) -> None:
+def check_targets(
+    model: mujoco.MjModel, other: mujoco.MjModel, targets: Mapping[str, TargetId]
+) -> None:
     """Make sure that the targets of another model are those of the model to be drawn.
 
-    `targets` are geom ids in the `other` model, by name. Raises `SceneError` if any geom has
+    `targets` are ids in the `other` model, by name. Raises `SceneError` if any geom has
     another shape or place, or a target another name.
     """
     if model is other:
         return
     differing = _differing(model, other, _SHAPES)
     if differing is None and any(
-        target_name(model, geom) != name for name, geom in targets.items()
+        target_name(model, target) != name for name, target in targets.items()
     ):
         differing = "names of geoms"
     if differing:

@@ -26,11 +26,11 @@ from .geoms import ByGeom, GeomKey, find_any, rotation_in_body, target_name
 from .hertz import Hits, hertz_moduli
 from .high_pass import HighPass
 from .hooks import adopt_warnings, followed
+from .ids import GeomId, TargetId, is_geom
 from .load import ContactLoads, Impulse
 from .model import CoupledModel
 from .own_model import own_data, own_model
 from .rippling import RipplingSurface, rippling_surfaces
-from .soft import is_soft
 from .solved_forces import SolvedForces
 from .stepping import (
     IN_TURN_WARNING,
@@ -154,16 +154,16 @@ class Ripples:
         self._surfaces, self._easings = rippling_surfaces(
             self.model, targets, options, self._whereabouts, can_ease
         )
-        # by geom id; shared with all who load or read the waves, and see new ones as soon as they
+        # by target; shared with all who load or read the waves, and see new ones as soon as they
         # are in here
-        self._waves = {surface.geom: surface.waves for surface in self._surfaces.values()}
+        self._waves = {surface.id: surface.waves for surface in self._surfaces.values()}
         adopt_warnings()
         self._contacts = named_collision_geoms(self.model, self, contacts_of(targets, contacts))
         self._moduli = hertz_moduli(self.model, targets)
         self._has_high_pass = {name: bool(target.high_pass) for name, target in targets.items()}
         self._has_two_way = two_way
         coupled = self._couple(None)
-        rigid_targets = [geom for geom in self._waves if geom not in coupled.soft]
+        rigid_targets = self._rigid_targets()
         self._check_tunnelling = TunnellingCheck(coupled, rigid_targets)
         for geom in rigid_targets:
             for message in collision_warnings(coupled, geom, self._waves[geom].atlas):
@@ -209,9 +209,9 @@ class Ripples:
         return len(self._surfaces)
 
     @property
-    def geom_ids(self) -> dict[str, int]:
-        """Geom id of every target, by name; a flex or a skin has one after all geoms."""
-        return {name: surface.geom for name, surface in self._surfaces.items()}
+    def geom_ids(self) -> dict[str, TargetId]:
+        """Id of every target, by name: the geom's; a flex or a skin has one after all geoms."""
+        return {name: surface.id for name, surface in self._surfaces.items()}
 
     def change_material(self, name: GeomKey, **coefficients: Any) -> None:
         """Change coefficients of a geom's material, by their names in `Material`.
@@ -234,7 +234,7 @@ class Ripples:
         material = dataclasses.replace(self._surface(name).material, **coefficients)
         self._change(name, material=material)
         if "density" in coefficients:
-            self._take_up_all(self._surface(name).geom)
+            self._take_up_all(self._surface(name).id)
 
     def poke(
         self, name: GeomKey, point: ArrayLike, impulse: float, radius: float = 0.0
@@ -338,11 +338,11 @@ class Ripples:
         MuJoCo chooses the frame of a mesh geom. Points of `poke` and `make_rigid` are in the body's
         frame; points of an atlas, and of the waves `ripples[name]`, are in the geom's frame.
         """
-        geom = self._surface(name).geom
-        if is_soft(self.model, geom):  # it is in the world
+        target = self._surface(name).id
+        if not is_geom(target, self.model):  # it is in the world
             return np.array(point, dtype=np.float64)
-        places = check_points(point) - self.model.geom_pos[geom]
-        return (places @ rotation_in_body(self.model, geom)).reshape(np.shape(point))
+        places = check_points(point) - self.model.geom_pos[target]
+        return (places @ rotation_in_body(self.model, target)).reshape(np.shape(point))
 
     @property
     def last_impulses(self) -> list[Impulse]:
@@ -439,7 +439,7 @@ class Ripples:
         frame, if `ripples[name].move` has moved them; otherwise the result is None.
         """
         surface = self._surface(name)
-        soft = self._soft.get(surface.geom)
+        soft = self._soft.get(surface.id)
         return surface.waves.vertices if soft is None else soft.vertices(data)
 
     def surface(self, name: GeomKey, data: mujoco.MjData | None = None) -> Surface:
@@ -479,7 +479,9 @@ class Ripples:
 
     def allow_any_height(self, name: GeomKey) -> None:
         """Give no warning of waves on a geom that are too high or too steep for it."""
-        self._check_amplitude.ignore(self._surface(name).geom)
+        target = self._surface(name).id
+        if is_geom(target, self.model):  # flexes and skins are not watched
+            self._check_amplitude.ignore(target)
 
     def _follow(self, data: mujoco.MjData) -> None:
         self._whereabouts.follow(data)
@@ -523,23 +525,24 @@ class Ripples:
         if self._two_way is not None:
             shared = self._two_way.solve(data, solved, elapsed, pending=pending)
         loads = self._loads.loads(solved, elapsed)
-        for geom, easing in self._eased.items():
-            self._warn_once(f"eased {geom}", easing_warning(target_name(self.model, geom), easing))
+        for target, easing in self._eased.items():
+            name = target_name(self.model, target)
+            self._warn_once(f"eased {target}", easing_warning(name, easing))
         for target, filtered in self._high_pass.items():
             unfiltered = loads[target]
             if isinstance(unfiltered, Load):  # always: hits on flexes and skins have no pulses
                 loads[target] = filtered(unfiltered)
-        for geom, waves in self._waves.items():
-            step_load = loads[geom] if shared is None else shared.get(geom)
+        for target, waves in self._waves.items():
+            step_load = loads[target] if shared is None else shared.get(target)
             waves.step(elapsed, load=step_load)
         if self._two_way is not None:
             self._two_way.settle()
 
-    def _take_up_all(self, geom: int) -> None:
+    def _take_up_all(self, target: TargetId) -> None:
         """Take up all forces on a target from now on: the user gives its density."""
-        self._easings.pop(geom, None)
-        if self._eased.pop(geom, None) is not None:
-            self._loads.take_up_all(geom)
+        self._easings.pop(target, None)
+        if self._eased.pop(target, None) is not None:
+            self._loads.take_up_all(target)
 
     def follow_shapes(self) -> None:
         """Lay new atlases on targets whose surfaces a program has changed in the model.
@@ -571,17 +574,18 @@ class Ripples:
         A target that `before` no longer watches is not warned of again.
         """
         coupled = CoupledModel(self.model, self._waves, self._contacts)
-        rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
+        rigid = {geom: self._waves[geom] for geom in self._rigid_targets()}
         self._soft = coupled.soft
         self._high_pass = {
             target: HighPass(self._waves[target], surface)
             for target, surface in coupled.soft.items()
             if surface.flex >= 0 and self._has_high_pass[target_name(self.model, target)]
         }
-        hits = {geom: Hits(coupled, geom, modulus) for geom, modulus in self._moduli.items()}
+        hits = {target: Hits(coupled, target, modulus) for target, modulus in self._moduli.items()}
         bodies = bodies_of(coupled)
         self._eased = {
-            geom: Easing(law, bodies, self._waves[geom].rest) for geom, law in self._easings.items()
+            target: Easing(law, bodies, self._waves[target].rest)
+            for target, law in self._easings.items()
         }
         self._loads = ContactLoads(coupled, self._waves, hits, self._eased)
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
@@ -591,6 +595,10 @@ class Ripples:
         can_push = self._has_two_way and not (self._moduli or coupled.soft)
         self._two_way = TwoWay(coupled, self._waves) if can_push else None
         return coupled
+
+    def _rigid_targets(self) -> list[GeomId]:
+        """The targets that are geoms."""
+        return [target for target in self._waves if is_geom(target, self.model)]
 
     def _surface(self, name: GeomKey) -> RipplingSurface:
         surface = self._surfaces.get(name) if isinstance(name, str) else None
@@ -613,7 +621,7 @@ class Ripples:
         for name in changed:
             surface = self._surfaces[name].on_its_surface(self.model)
             self._surfaces[name] = surface
-            self._waves[surface.geom] = surface.waves
+            self._waves[surface.id] = surface.waves
         return changed
 
     def _change(self, name: GeomKey, **changes: Any) -> None:
@@ -622,13 +630,14 @@ class Ripples:
         If that fails, nothing has changed.
         """
         surface = self._surface(name).rebuilt(**changes)
-        geom = surface.geom
-        self._surfaces[target_name(self.model, geom)] = surface
-        self._waves[geom] = surface.waves
-        self._loads.waves_changed(geom)
-        self._check_amplitude.waves_changed(geom, surface.waves)
-        if geom in self._high_pass:
-            self._high_pass[geom] = HighPass(surface.waves, self._soft[geom])
+        target = surface.id
+        self._surfaces[target_name(self.model, target)] = surface
+        self._waves[target] = surface.waves
+        self._loads.waves_changed(target)
+        if is_geom(target, self.model):
+            self._check_amplitude.waves_changed(target, surface.waves)
+        if target in self._high_pass:
+            self._high_pass[target] = HighPass(surface.waves, self._soft[target])
 
     def _flatten(self) -> None:
         self._check_amplitude.flush()

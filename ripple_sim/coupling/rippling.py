@@ -17,7 +17,8 @@ from ripple_sim.solver.operator.regions import hold
 
 from .easing import EasingLaw
 from .geoms import find_target, target_name
-from .soft import is_soft, target_pose
+from .ids import TargetId, is_geom
+from .soft import target_pose
 from .suited import suited_targets
 from .target import Target
 from .target_mesh import target_atlas
@@ -31,8 +32,7 @@ class RipplingSurface:
 
     Attributes
     ----------
-    geom : int
-        Target id: of a geom, a flex or a skin.
+    id : TargetId
     material : Material
     options : mapping
         Keyword arguments of `WaveSolver`.
@@ -45,7 +45,7 @@ class RipplingSurface:
         Tells whether the surface in the model is still the atlas's.
     """
 
-    geom: int
+    id: TargetId
     material: Material
     options: Mapping[str, Any]
     waves: TargetWaves
@@ -58,7 +58,7 @@ class RipplingSurface:
 
         Raises `SceneError` if something belongs to single texels of the old atlas.
         """
-        name = target_name(model, self.geom)
+        name = target_name(model, self.id)
         old = self.waves
         ties = [
             ("a region of it is held still", self.held is not None),
@@ -71,10 +71,10 @@ class RipplingSurface:
                     f"the surface of {name!r} was changed in the model, and {what}, which belongs "
                     "to the old one: make new Ripples for the model as it is now"
                 )
-        atlas = target_atlas(model, self.geom, old.rest.resolution, self.layout)
+        atlas = target_atlas(model, self.id, old.rest.resolution, self.layout)
         new = old.on(atlas, self.material, **self.options)
         new.listeners.find_points = old.listeners.find_points
-        return dataclasses.replace(self, waves=new, shape=WatchedShape(model, self.geom))
+        return dataclasses.replace(self, waves=new, shape=WatchedShape(model, self.id))
 
     def rebuilt(self, **changes: Any) -> RipplingSurface:
         """A copy with a new solver, in the state of the old one.
@@ -101,7 +101,7 @@ def _is_mapped(material: Material) -> bool:
     return any(isinstance(value, np.ndarray) and value.ndim for value in values)
 
 
-def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
+def site_on(model: mujoco.MjModel, target: TargetId, name: str) -> NDArray[np.float64]:
     """Where a site is in the frame of a target [m], [3].
 
     The site is on the geom's body, or on one welded to it. A flex or a skin is in the world; the
@@ -116,7 +116,9 @@ def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
             f"{', '.join(filter(None, sites)) or 'none'}"
         )
     data = mujoco.MjData(model)
-    bodies = [] if is_soft(model, geom) else [model.site_bodyid[site], model.geom_bodyid[geom]]
+    bodies = []
+    if is_geom(target, model):
+        bodies = [model.site_bodyid[site], model.geom_bodyid[target]]
     if len({int(model.body_weldid[body]) for body in bodies}) > 1:
         names = " and ".join(repr(model.body(body).name) for body in bodies)
         raise SceneError(
@@ -124,7 +126,7 @@ def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
             "the geom's"
         )
     mujoco.mj_kinematics(model, data)
-    position, rotation = target_pose(data, geom)
+    position, rotation = target_pose(data, target)
     return (data.site_xpos[site] - position) @ rotation
 
 
@@ -134,8 +136,8 @@ def rippling_surfaces(
     options: Mapping[str, Any],
     whereabouts: Whereabouts,
     can_ease: bool,
-) -> tuple[dict[str, RipplingSurface], dict[int, EasingLaw]]:
-    """The surfaces of targets, by name, and the laws by which forces on them are eased, by geom id.
+) -> tuple[dict[str, RipplingSurface], dict[TargetId, EasingLaw]]:
+    """The surfaces of targets, by name, and the laws by which forces on them are eased, by id.
 
     Parameters
     ----------
@@ -154,16 +156,16 @@ def rippling_surfaces(
     suited = suited_targets(model, materials, resolutions, can_ease=can_ease)
     surfaces = {}
     for name, target in targets.items():
-        geom = find_target(model, name)
+        target_id = find_target(model, name)
         layout = target.layout or "auto"
         own_options = {**options, "rim": target.rim, "conserve_volume": target.conserve_volume}
         material = suited.materials[name]
-        atlas = target_atlas(model, geom, suited.resolutions[name], layout)
-        waves = TargetWaves(whereabouts, geom, atlas, material, **own_options)
-        waves.listeners.find_points = functools.partial(site_on, model, geom)
-        shape = WatchedShape(model, geom)
+        atlas = target_atlas(model, target_id, suited.resolutions[name], layout)
+        waves = TargetWaves(whereabouts, target_id, atlas, material, **own_options)
+        waves.listeners.find_points = functools.partial(site_on, model, target_id)
+        shape = WatchedShape(model, target_id)
         surfaces[name] = RipplingSurface(
-            geom, material, own_options, waves, layout=layout, shape=shape
+            target_id, material, own_options, waves, layout=layout, shape=shape
         )
     easings = {find_target(model, name): law for name, law in suited.easings.items()}
     return surfaces, easings

@@ -1,7 +1,6 @@
 """Soft targets: flexes and skins, whose surfaces move in the world.
 
-Their ids come after those of geoms and of the vertices of flexes; see `CoupledModel`. A
-`SoftSurface` is the mesh and where it is.
+Their target ids are in `ids`. A `SoftSurface` is the mesh and where it is.
 """
 
 from __future__ import annotations
@@ -14,51 +13,44 @@ from scipy.spatial import cKDTree
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh
 
-
-def first_flex(model: mujoco.MjModel) -> int:
-    """Target id of the first flex."""
-    return int(model.ngeom + model.nflexvert)
-
-
-def first_skin(model: mujoco.MjModel) -> int:
-    """Target id of the first skin."""
-    return first_flex(model) + int(model.nflex)
-
-
-def is_soft(model: mujoco.MjModel, target: int) -> bool:
-    """Whether a target is a flex or a skin, and no geom."""
-    return target >= model.ngeom
+from .ids import (
+    GeomId,
+    TargetId,
+    flex_of,
+    geom_id,
+    is_geom,
+    skin_of,
+    target_of_flex,
+    target_of_skin,
+)
 
 
 def target_pose(
-    data: mujoco.MjData, target: int
+    data: mujoco.MjData, target: TargetId
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Position [3] [m] and rotation [3, 3] of a target's frame in the world, as copies.
 
     The frame of a flex or a skin is the world.
     """
-    if is_soft(data.model, target):
-        return np.zeros(3), np.eye(3)
-    return data.geom_xpos[target].copy(), data.geom_xmat[target].reshape(3, 3).copy()
+    if is_geom(target, data.model):
+        return data.geom_xpos[target].copy(), data.geom_xmat[target].reshape(3, 3).copy()
+    return np.zeros(3), np.eye(3)
 
 
-def find_soft(model: mujoco.MjModel, name: object) -> int:
-    """Target id of the flex or skin of a name, -1 if there is none."""
+def find_soft(model: mujoco.MjModel, name: object) -> TargetId | None:
+    """Target id of the flex or skin of a name, if there is one."""
     if not isinstance(name, str) or not name:
-        return -1
-    for kind, first in (
-        (mujoco.mjtObj.mjOBJ_FLEX, first_flex(model)),
-        (mujoco.mjtObj.mjOBJ_SKIN, first_skin(model)),
-    ):
-        number = mujoco.mj_name2id(model, kind, name)
-        if number >= 0:
-            return first + int(number)
-    return -1
+        return None
+    flex = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX, name)
+    if flex >= 0:
+        return target_of_flex(model, flex)
+    skin = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SKIN, name)
+    return target_of_skin(model, skin) if skin >= 0 else None
 
 
-def soft_name(model: mujoco.MjModel, target: int) -> str:
+def soft_name(model: mujoco.MjModel, target: TargetId) -> str:
     """Name of a flex or a skin, see `soft_names`."""
-    return soft_names(model)[target - first_flex(model)]
+    return soft_names(model)[target - target_of_flex(model, 0)]
 
 
 def soft_names(model: mujoco.MjModel) -> list[str]:
@@ -75,28 +67,26 @@ class SoftSurface:
     Parameters
     ----------
     model : mujoco.MjModel
-    target : int
+    target : TargetId
         See `find_soft`.
 
     Attributes
     ----------
     mesh : Mesh
         At the model's initial pose, in the world [m].
-    geoms : list of int
+    geoms : list of GeomId
         Geoms of the bodies under a skin, whose contacts are the skin's; none for a flex.
-    flex : int
-        Flex id, or -1 for a skin.
+    flex : FlexId
+        -1 for a skin.
     """
 
-    def __init__(self, model: mujoco.MjModel, target: int) -> None:
+    def __init__(self, model: mujoco.MjModel, target: TargetId) -> None:
         self._model = model
-        self.flex = -1
-        self._skin = -1
-        if target < first_skin(model):
-            self.flex = target - first_flex(model)
+        self.flex = flex_of(model, target)
+        self._skin = skin_of(model, target)
+        if self.flex >= 0:
             F = self._flex_triangles(soft_name(model, target))
         else:
-            self._skin = target - first_skin(model)
             first = int(model.skin_boneadr[self._skin])
             self._bones = slice(first, first + int(model.skin_bonenum[self._skin]))
             first = model.skin_faceadr[self._skin]
@@ -113,9 +103,10 @@ class SoftSurface:
             raise SceneError(
                 f"the surface of {soft_name(model, target)!r} is not that of its vertices"
             )
-        self.geoms: list[int] = []
+        self.geoms: list[GeomId] = []
         if self._skin >= 0:
-            self.geoms = np.flatnonzero(np.isin(model.geom_bodyid, self.bodies)).tolist()
+            geoms = np.flatnonzero(np.isin(model.geom_bodyid, self.bodies))
+            self.geoms = [geom_id(geom) for geom in geoms.tolist()]
 
     def _flex_triangles(self, name: str) -> NDArray[np.int32]:
         """Triangles of a flex, [m, 3]: its own, or those of the outside of its tetrahedra."""

@@ -11,6 +11,7 @@ import numpy as np
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.kernel import Floats
 
+from .ids import TargetId
 from .model import CoupledModel
 
 # Share of the impulses on a target that may be missing from the bodies' motion, or be there without
@@ -55,13 +56,13 @@ class SolverBalance:
         self._free = (
             model.jnt_type[model.body_jntadr[model.tree_bodyadr]] == mujoco.mjtJoint.mjJNT_FREE
         )
-        self._warned = set[int]()
+        self._warned = set[TargetId]()
         # for how many steps each target has been touched
-        self._touched: dict[int, int] = {}
+        self._touched: dict[TargetId, int] = {}
         # of each target: looks, sum of contact forces [N], and missing part of the forces [N]
         self._sums = {target: np.zeros(3) for target in range(model.ngeom)}
 
-    def __call__(self, data: mujoco.MjData, contacts: Mapping[int, Any]) -> None:
+    def __call__(self, data: mujoco.MjData, contacts: Mapping[TargetId, Any]) -> None:
         """Warn of the targets whose forces and bodies disagree.
 
         Call it with the `Contacts` of each step, by target.
@@ -115,7 +116,7 @@ class SolverBalance:
         force[:-1][self._free] = np.sqrt(missing[translations].sum(axis=1))
         return force, np.append(np.where(self._free, np.inf, share), np.inf)
 
-    def _judge(self, target: int) -> None:
+    def _judge(self, target: TargetId) -> None:
         """Warn of a target if too much of its contact forces is missing."""
         _, whole, missing = self._sums[target]
         if target in self._warned or missing <= _TOLERANCE * whole:

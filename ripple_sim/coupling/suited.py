@@ -29,8 +29,9 @@ from ripple_sim.solver.texels.thickness import half_thickness_at
 
 from .easing import EasingLaw
 from .geoms import find_target
+from .ids import GeomId, TargetId, geom_id, is_geom
 from .model import CoupledModel
-from .soft import SoftSurface, is_soft
+from .soft import SoftSurface
 from .target_mesh import target_mesh
 
 # Time in which waves cross the target [s].
@@ -160,7 +161,12 @@ class SuitedMaterial(NamedTuple):
 
 
 def suited_material(
-    coupled: CoupledModel, geom: int, extent: Extent, material: Material, *, can_ease: bool = False
+    coupled: CoupledModel,
+    geom: GeomId,
+    extent: Extent,
+    material: Material,
+    *,
+    can_ease: bool = False,
 ) -> SuitedMaterial:
     """Choose the coefficients that a material leaves to the model.
 
@@ -185,7 +191,7 @@ def suited_material(
     Parameters
     ----------
     coupled : CoupledModel
-    geom : int
+    geom : GeomId
         The target.
     extent : Extent
         Of its surface.
@@ -226,7 +232,9 @@ def suited_material(
     return SuitedMaterial(_filled_in(material, speed, stiffness, density), easing)
 
 
-def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> float:
+def bearing_density(
+    coupled: CoupledModel, geom: GeomId, extent: Extent, material: Material
+) -> float:
     """Density with which a target bears what may lie on it and hit it [kg/m^2].
 
     It is chosen as in `suited_material`. The least speed and stiffness of the material count.
@@ -272,7 +280,7 @@ def _filled_in(material: Material, speed: float, stiffness: float, density: floa
 
 def _density_under(
     coupled: CoupledModel,
-    geom: int,
+    geom: GeomId,
     extent: Extent,
     speed: float,
     stiffness: float,
@@ -314,7 +322,7 @@ class Hit(NamedTuple):
 
 def _density_for(
     coupled: CoupledModel,
-    geom: int,
+    geom: GeomId,
     extent: Extent,
     hit: Hit,
     speed: float,
@@ -350,7 +358,7 @@ def _stiffness_of_the_whole(extent: Extent, speed: float, stiffness: float) -> f
     return max(stiffness, (_LONGEST_WAVE_NUMBER * speed / extent.size) ** 2)
 
 
-def lightest_hit(coupled: CoupledModel, geom: int, extent: Extent) -> Hit | None:
+def lightest_hit(coupled: CoupledModel, geom: GeomId, extent: Extent) -> Hit | None:
     """Hit of the lightest body that can touch a target and is not joined to it, or None.
 
     The body falls from a height of the target's size, or from where it is above the target as the
@@ -364,7 +372,7 @@ def lightest_hit(coupled: CoupledModel, geom: int, extent: Extent) -> Hit | None
     others = np.flatnonzero((reduced > 0) & (roots != roots[geom]))
     if not len(others):
         return None
-    lightest = int(others[np.argmin(reduced[others])])
+    lightest = geom_id(int(others[np.argmin(reduced[others])]))
     moves = bool(_moves(model)[lightest])
     height = min(max(extent.size, _height(coupled, geom)), 2 * extent.size)
     return Hit(
@@ -390,7 +398,7 @@ def _fall(model: mujoco.MjModel, height: float) -> float:
     return float(max(np.sqrt(2 * np.linalg.norm(model.opt.gravity) * height), height))
 
 
-def _height(coupled: CoupledModel, geom: int) -> float:
+def _height(coupled: CoupledModel, geom: GeomId) -> float:
     """From how high bodies fall on a target at the model's beginning, or it on them [m]."""
     model = coupled.model
     data = mujoco.MjData(coupled.model)
@@ -403,7 +411,7 @@ def _height(coupled: CoupledModel, geom: int) -> float:
     return float(between[falls].max(initial=0.0))
 
 
-def _resting(coupled: CoupledModel, geom: int) -> float:
+def _resting(coupled: CoupledModel, geom: GeomId) -> float:
     """Mass of the heaviest body that can lie on a target, or on which it can lie [kg]."""
     model = coupled.model
     tree_masses = model.body_subtreemass[model.body_rootid]
@@ -419,7 +427,7 @@ def _moves(model: mujoco.MjModel) -> NDArray[np.bool_]:
     return np.asarray(model.body_weldid[model.geom_bodyid] != 0)
 
 
-def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
+def heaviest(coupled: CoupledModel, geom: GeomId) -> tuple[float, float]:
     """Mass of the heaviest body that can touch a target [kg], and its footprint radius [m].
 
     If both bodies move, it is their reduced mass. A body has the mass of all that it is joined to.
@@ -431,7 +439,7 @@ def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
     return float(reduced.max()), float(footprint)
 
 
-def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
+def _reduced_masses(coupled: CoupledModel, geom: GeomId) -> NDArray[np.float64]:
     """Reduced mass of each geom's body and a target's [kg].
 
     It is 0 where the two cannot touch, or neither moves.
@@ -457,7 +465,7 @@ def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
         f'the preset "suited" of {name!r} needs a size [m] and a hit [kg, m/s], as size = 1.0, hit '
         "= [0.5, 4.4]"
     )
-    if is_soft(model, geom):
+    if not is_geom(geom, model):
         raise SceneError(f"{needs}: what may hit a flex or a skin is not known")
     coupled = CoupledModel(model, [geom])
     extent = Extent.of(target_mesh(model, geom))
@@ -477,7 +485,9 @@ def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
     }
 
 
-def suited_resolution(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> int:
+def suited_resolution(
+    coupled: CoupledModel, geom: GeomId, extent: Extent, material: Material
+) -> int:
     """Texels along a chart's side, a multiple of 16 from 32 to 256.
 
     It is 96, or more where that is needed for four texels in the footprint of the heaviest body
@@ -525,14 +535,14 @@ def suited_targets(
     suited = dict(materials)
     texels = {name: n for name, n in resolutions.items() if n is not None}
     easings: dict[str, EasingLaw] = {}
-    geoms = {}
+    geoms: dict[str, GeomId] = {}
     for name in materials:
         target = find_target(model, name)
-        if is_soft(model, target):
+        if is_geom(target, model):
+            geoms[name] = target
+        else:
             suited[name] = _suited_to_soft(model, target, materials[name])
             texels.setdefault(name, _SOFT_RESOLUTION)
-        else:
-            geoms[name] = target
     open_names = [name for name in geoms if materials[name].unset or name not in texels]
     if not open_names:
         return SuitedTargets(suited, texels, easings)
@@ -552,7 +562,7 @@ def suited_targets(
     return SuitedTargets(suited, texels, easings)
 
 
-def _suited_to_soft(model: mujoco.MjModel, target: int, material: Material) -> Material:
+def _suited_to_soft(model: mujoco.MjModel, target: TargetId, material: Material) -> Material:
     """The material of a flex or a skin, filled in by its size and the mass of its bodies.
 
     What may hit it is not looked at.
@@ -576,7 +586,7 @@ def _is_intricate(mesh: Mesh) -> bool:
     return len(mesh.F) > _MANY_TRIANGLES and not is_sphere
 
 
-def _warn_of_unseen(coupled: CoupledModel, name: str, geom: int, extent: Extent) -> None:
+def _warn_of_unseen(coupled: CoupledModel, name: str, geom: GeomId, extent: Extent) -> None:
     """Warn of a target that is made so heavy that hits of a light body will not be seen."""
     reduced = _reduced_masses(coupled, geom)
     heavy = max(_resting(coupled, geom), float(reduced.max()))

@@ -17,7 +17,8 @@ from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.clean import counted
 
 from .geoms import TARGET_TYPES, geom_name
-from .soft import SoftSurface, is_soft
+from .ids import GeomId, TargetId, is_geom
+from .soft import SoftSurface
 
 # Longest edge of a triangle over the size of the primitive.
 _LONGEST_EDGE = 1 / 24
@@ -105,7 +106,9 @@ def primitive_triangles(
     return scale * V, F
 
 
-def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str = "auto") -> Atlas:
+def target_atlas(
+    model: mujoco.MjModel, target: TargetId, resolution: int, layout: str = "auto"
+) -> Atlas:
     """Atlas of a target's surface [m], in a layout of `build_atlas`.
 
     It is in the geom's frame; the atlas of a flex or a skin is in the world.
@@ -117,14 +120,14 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
     AtlasError
         If no charts can be laid on it, as where it is a heap of thin loose pieces.
     """
-    if is_soft(model, geom):
-        return build_atlas(SoftSurface(model, geom).mesh, resolution, layout=layout)
-    if TARGET_TYPES[int(model.geom_type[geom])] == "sphere" and layout != "patches":
-        radius = float(model.geom_size[geom, 0])
+    if not is_geom(target, model):
+        return build_atlas(SoftSurface(model, target).mesh, resolution, layout=layout)
+    if TARGET_TYPES[int(model.geom_type[target])] == "sphere" and layout != "patches":
+        radius = float(model.geom_size[target, 0])
         return _atlases.get(
             f"sphere {radius!r} {resolution}", lambda: sphere_atlas(radius, resolution)
         )
-    V, F, uv, name = _surface(model, geom)
+    V, F, uv, name = _surface(model, target)
     key = content_key(f"{resolution} {layout}", [V, F, np.zeros(0) if uv is None else uv])
 
     def build() -> Atlas:
@@ -141,12 +144,12 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
     return _atlases.get(key, build)
 
 
-def target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
+def target_mesh(model: mujoco.MjModel, geom: GeomId) -> Mesh:
     """Surface of a geom in the geom's frame [m]; see `target_atlas`."""
     return Mesh.from_arrays(*_surface(model, geom))
 
 
-def _surface(model: mujoco.MjModel, geom: int) -> tuple[NDArray, NDArray, NDArray | None, str]:
+def _surface(model: mujoco.MjModel, geom: GeomId) -> tuple[NDArray, NDArray, NDArray | None, str]:
     """What `Mesh.from_arrays` takes: vertices, triangles, texture coordinates, name."""
     kind = TARGET_TYPES[int(model.geom_type[geom])]
     asset = int(model.geom_dataid[geom])

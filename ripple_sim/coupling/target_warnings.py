@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Atlas
 
 from .geoms import TARGET_TYPES
+from .ids import GeomId
 from .model import CoupledModel, flex_thickness
 from .target_mesh import mesh_arrays, primitive_triangles
 
@@ -46,7 +47,9 @@ def hull_gap(atlas: Atlas) -> float:
     return float(np.linalg.norm(points - closest, axis=1).max())
 
 
-def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Iterable[int]) -> float:
+def collision_gap(
+    coupled: CoupledModel, target: GeomId, atlas: Atlas, geoms: Iterable[GeomId]
+) -> float:
     """Distance of a target's surface from the geoms that collide for it [m].
 
     It is how deep bodies sink into the surface before they meet these geoms, or how far above the
@@ -56,12 +59,11 @@ def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Itera
     Parameters
     ----------
     coupled : CoupledModel
-    target : int
-        Geom id.
+    target : GeomId
     atlas : Atlas
         Of the target.
-    geoms : iterable of int
-        Ids of geoms on its body or on bodies welded to it. Planes and height fields have no surface
+    geoms : iterable of GeomId
+        Geoms on its body or on bodies welded to it. Planes and height fields have no surface
         to be off from.
     """
     model = coupled.model
@@ -85,7 +87,7 @@ def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Itera
 
 
 def _collision_surface(
-    coupled: CoupledModel, geom: int
+    coupled: CoupledModel, geom: GeomId
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices [m], [n, 3], and triangles, [m, 3], of the surface with which a geom collides."""
     model = coupled.model
@@ -99,7 +101,7 @@ def _collision_surface(
     return np.array(hull.vertices), np.array(hull.faces)
 
 
-def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
+def collision_warnings(coupled: CoupledModel, geom: GeomId, atlas: Atlas) -> Iterator[str]:
     """Warnings of contacts that a target gets wrongly, or not at all.
 
     Nothing can touch it, it collides off its surface, or MuJoCo tells no forces of its contacts.
@@ -129,11 +131,11 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
             )
 
 
-def _collider_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
+def _collider_warning(coupled: CoupledModel, geom: GeomId, atlas: Atlas) -> Iterator[str]:
     """Warning of a target for which other geoms collide, off its surface."""
     name = coupled.names[geom]
     size = _size(atlas)
-    colliders: list[int] = []
+    colliders: list[GeomId] = []
     for solid in coupled.collision_geoms(geom):
         colliders += coupled.convex_colliders.get(solid, [solid])
     gap = collision_gap(coupled, geom, atlas, colliders)
@@ -146,7 +148,7 @@ def _collider_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterato
         )
 
 
-def _hull_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
+def _hull_warning(coupled: CoupledModel, geom: GeomId, atlas: Atlas) -> Iterator[str]:
     """Warning of a mesh geom whose convex hull is off its surface."""
     name = coupled.names[geom]
     size = _size(atlas)
@@ -159,7 +161,7 @@ def _hull_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[st
         )
 
 
-def _sdf_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
+def _sdf_warning(coupled: CoupledModel, geom: GeomId) -> Iterator[str]:
     """Warning of height fields that an SDF geom does not meet."""
     name = coupled.names[geom]
     is_field = coupled.model.geom_type == _GEOM.mjGEOM_HFIELD
@@ -178,7 +180,7 @@ def _size(atlas: Atlas) -> float:
     return float(np.ptp(atlas.mesh.V, axis=0).max())
 
 
-def _touch_warning(coupled: CoupledModel, geom: int) -> str:
+def _touch_warning(coupled: CoupledModel, geom: GeomId) -> str:
     """Warning of a target that nothing can touch."""
     model = coupled.model
     name = coupled.names[geom]
@@ -203,7 +205,7 @@ def _touch_warning(coupled: CoupledModel, geom: int) -> str:
     )
 
 
-def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
+def _flex_warning(coupled: CoupledModel, geom: GeomId) -> Iterator[str]:
     """Warning of geoms that a flex collider meets badly, or not at all."""
     model = coupled.model
     name = coupled.names[geom]

@@ -13,6 +13,7 @@ from ripple_sim.solver.cache import kept_with
 from ripple_sim.solver.mesh import vertex_normals
 from ripple_sim.solver.mesh.points import check_points
 
+from .ids import TargetId
 from .own_model import own_data, posed
 from .soft import target_pose
 
@@ -68,7 +69,7 @@ class TargetWaves(WaveSolver):
     def __init__(
         self,
         whereabouts: Whereabouts,
-        target: int,
+        target: TargetId,
         atlas: Atlas,
         material: Material,
         **options: Any,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.kernel import Floats, Ints
 
+from .ids import GeomId
 from .model import SPECULATIVE, CoupledModel
 
 # Safe depth over the sum of the two geoms' smallest half-extents: geoms came through at 0.9.
@@ -63,11 +66,10 @@ class TunnellingCheck:
     Parameters
     ----------
     coupled : CoupledModel
-    targets : sequence of int
-        Geom ids.
+    targets : sequence of GeomId
     """
 
-    def __init__(self, coupled: CoupledModel, targets: list[int]) -> None:
+    def __init__(self, coupled: CoupledModel, targets: Sequence[GeomId]) -> None:
         self._model = coupled.model
         self._names = coupled.names
         self._pairs = _watched_pairs(coupled, targets)
@@ -142,7 +144,7 @@ def too_fast(
     return rows, speeds[rows]
 
 
-def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void]:
+def _watched_pairs(coupled: CoupledModel, targets: Sequence[GeomId]) -> NDArray[np.void]:
     """Pairs of a geom that collides for a target and another geom, which may tunnel, `PAIR` [p]."""
     model = coupled.model
     target, other = _pairs_at_risk(coupled, targets)
@@ -155,7 +157,7 @@ def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void
     return pairs
 
 
-def _pairs_at_risk(coupled: CoupledModel, targets: list[int]) -> tuple[Ints, Ints]:
+def _pairs_at_risk(coupled: CoupledModel, targets: Sequence[GeomId]) -> tuple[Ints, Ints]:
     """Geom ids of pairs, [p] each, that MuJoCo's speculative contacts do not stop in time."""
     model = coupled.model
     at_risk = np.ones(model.ngeom, dtype=bool)
@@ -163,7 +165,7 @@ def _pairs_at_risk(coupled: CoupledModel, targets: list[int]) -> tuple[Ints, Int
         at_risk = _is_sdf(model) | coupled.has_flex[: model.ngeom]
     is_thin = np.isfinite(coupled.collider_extents)
     # the geoms that collide for the targets, each once
-    colliders: dict[int, None] = {}
+    colliders: dict[GeomId, None] = {}
     for target in targets:
         colliders.update(dict.fromkeys(coupled.collision_geoms(target)))
     pairs = []

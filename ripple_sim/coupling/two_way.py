@@ -26,8 +26,9 @@ from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
 from .collision_geoms import ENDLESS
 from .contacts import collider_ids, pair_rows, places_facing, points_outside
-from .energy import ContactProblem, Key, Pair, VelocityChange, Work, affordable_share
+from .energy import ContactProblem, Key, Pair, Purse, VelocityChange, Work, affordable_share
 from .geoms import TARGET_TYPES
+from .ids import GeomId, TargetId, geom_id, is_geom
 from .model import CoupledModel
 from .patches import MAX_CORNERS, SAME_PLACE
 from .sleep import SLEEP, at_rest, sleeping_dofs, wake
@@ -43,7 +44,7 @@ _NEAREST_POINT_ROUNDS = 3
 
 
 def support_point(
-    model: mujoco.MjModel, geom: int, direction: NDArray[np.float64]
+    model: mujoco.MjModel, geom: GeomId, direction: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Point [m], [3], of a geom that lies farthest in a direction.
 
@@ -52,7 +53,7 @@ def support_point(
     Parameters
     ----------
     model : mujoco.MjModel
-    geom : int
+    geom : GeomId
         A sphere, ellipsoid, capsule, cylinder or box; of a mesh or sdf geom the convex hull counts.
     direction : float64 [3]
         Unit vector in the frame of the geom, as is the result.
@@ -88,7 +89,7 @@ def _side(along: float) -> float:
 def within_reach(
     coupled: CoupledModel,
     data: mujoco.MjData,
-    pair: Key,
+    pair: tuple[GeomId, GeomId],
     waves: WaveSolver,
     height: Floats32,
     highest: float,
@@ -103,7 +104,7 @@ def within_reach(
     ----------
     coupled : CoupledModel
     data : mujoco.MjData
-    pair : (int, int)
+    pair : (GeomId, GeomId)
         Target and other.
     waves : WaveSolver
         Of the target.
@@ -169,7 +170,7 @@ class _Reached(NamedTuple):
 
     Attributes
     ----------
-    key : (int, int)
+    key : (TargetId, ColliderId)
         Target and other.
     point, normal : float64 [3]
         Of the surface, in the world [m].
@@ -304,46 +305,49 @@ class TwoWay:
     ----------
     coupled : CoupledModel
     waves : mapping
-        Waves of each target, by geom id.
+        Waves of each target; all targets are geoms.
     """
 
-    def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
+    def __init__(self, coupled: CoupledModel, waves: Mapping[TargetId, WaveSolver]) -> None:
         self._coupled = coupled
         self._waves = waves
         model = coupled.model
         # geoms that may come within reach of each target
-        self._reachable: dict[int, list[int]] = {}
+        self._reachable: dict[GeomId, list[GeomId]] = {}
         # the targets that each geom collides for
-        self._targets_of: dict[int, list[int]] = {}
+        self._targets_of: dict[GeomId, list[GeomId]] = {}
         solid = np.isin(model.geom_type, list(TARGET_TYPES)) & ~np.isin(model.geom_type, ENDLESS)
         moving = (model.body_weldid[model.geom_bodyid] > 0) & solid
         for target in waves:
-            self._reachable[target] = np.flatnonzero(moving & coupled.can_collide(target)).tolist()
+            if not is_geom(target, model):
+                continue  # refused by `Ripples`
+            others = np.flatnonzero(moving & coupled.can_collide(target)).tolist()
+            self._reachable[target] = [geom_id(other) for other in others]
             for geom in coupled.collision_geoms(target):
                 self._targets_of.setdefault(geom, []).append(target)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[list(self._targets_of)] = True
-        self._trials: dict[int, _Trials] = {}
+        self._trials: dict[TargetId, _Trials] = {}
         self.clear()
 
     def clear(self) -> None:
         """Forget all contacts."""
         self._velocity_change = VelocityChange(self._coupled.model)
         self._places: dict[Key, _Place] = {}
-        self._known_mobilities: dict[int, _KnownMobilities] = {}
+        self._known_mobilities: dict[TargetId, _KnownMobilities] = {}
         # force of each pair in the last step [N]
         self._forces: dict[Key, float] = {}
         # energy that each pair has paid in [J], by `Pair.purse`
-        self._paid: dict[Key, float] = {}
+        self._paid: dict[Purse, float] = {}
         # heights at the beginning of the last step [m], by target
-        self._heights_before: dict[int, NDArray[np.float32]] = {}
+        self._heights_before: dict[TargetId, NDArray[np.float32]] = {}
         self._just_begun = True
         # what the forces of the latest step do, to be accounted for by `settle`
         self._works: list[Work] = []
 
     def solve(
         self, data: mujoco.MjData, solved: mujoco.MjData, elapsed: float, *, pending: bool
-    ) -> dict[int, Load]:
+    ) -> dict[TargetId, Load]:
         """Find the contact forces anew, correct the bodies' motion; return the targets' loads.
 
         Parameters
@@ -413,9 +417,11 @@ class TwoWay:
         self._works = problem.works()
         return forces
 
-    def _loads(self, forces: Mapping[Key, float], dt: float, elapsed: float) -> dict[int, Load]:
+    def _loads(
+        self, forces: Mapping[Key, float], dt: float, elapsed: float
+    ) -> dict[TargetId, Load]:
         """Load on each target over a time [s], from forces [N] that act for dt [s]."""
-        loads: dict[int, list[Load]] = {}
+        loads: dict[TargetId, list[Load]] = {}
         for key, force in forces.items():
             unit = self._places[key].load
             load = Load(unit.texels, force * dt / elapsed * unit.forces)
@@ -444,10 +450,10 @@ class TwoWay:
         self,
         data: mujoco.MjData,
         number: int,
-        geom: int,
+        geom: GeomId,
         point: NDArray[np.float64],
         normal: NDArray[np.float64],
-    ) -> tuple[int, _Contact]:
+    ) -> tuple[GeomId, _Contact]:
         """The nearest target that a geom collides for, and a contact, given in the world, on it."""
         choices = []
         for target in self._targets_of[geom]:
@@ -521,7 +527,7 @@ class TwoWay:
         tolerance = SAME_PLACE * float(np.sqrt(atlas.areas.reshape(-1)[texels[0]]))
         return _Place(atlas, points, tolerance, load, self._moving(target, load))
 
-    def _moving(self, target: int, load: Load) -> NDArray[np.float64]:
+    def _moving(self, target: TargetId, load: Load) -> NDArray[np.float64]:
         """The part of a load's forces [N] that moves the texels, [t]."""
         return load.forces * self._waves[target].operator.source_share.reshape(-1)[load.texels]
 
@@ -563,7 +569,7 @@ class TwoWay:
                 pairs[key] = self._pair(key, place, surface, mobilities[key], dt)
         return pairs
 
-    def _trial_waves(self, target: int) -> _Trials:
+    def _trial_waves(self, target: TargetId) -> _Trials:
         """Copies of a target's waves, the same ones as long as the waves allow."""
         waves = self._waves[target]
         trials = self._trials.get(target)
@@ -574,7 +580,7 @@ class TwoWay:
         return trials
 
     def _step_trial(
-        self, target: int, trial: WaveSolver, places: Mapping[Key, _Place], dt: float
+        self, target: TargetId, trial: WaveSolver, places: Mapping[Key, _Place], dt: float
     ) -> _SurfaceStep:
         """Step trial waves by dt [s] from where the target's waves are, under the last forces."""
         waves = self._waves[target]
@@ -594,7 +600,7 @@ class TwoWay:
         )
 
     def _mobilities(
-        self, target: int, trial: WaveSolver, places: Mapping[Key, _Place], dt: float
+        self, target: TargetId, trial: WaveSolver, places: Mapping[Key, _Place], dt: float
     ) -> dict[Key, _Mobility]:
         """Mobility of the surface under each place, when unit forces act on all places at once.
 

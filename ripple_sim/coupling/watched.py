@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from .soft import is_soft
+from .ids import TargetId, is_geom
 
 # Arrays up to this size are compared whole at each look, in some 0.05 ms [bytes].
 _MAX_WHOLE_SIZE = 1 << 20
@@ -68,12 +68,12 @@ class WatchedShape:
     Parameters
     ----------
     model : mujoco.MjModel
-    geom : int
-        Geom id; what is soft has no shape of its own, and never changes.
+    target : TargetId
+        What is soft has no shape of its own, and never changes.
     """
 
-    def __init__(self, model: mujoco.MjModel, geom: int) -> None:
-        self._geom = geom
+    def __init__(self, model: mujoco.MjModel, target: TargetId) -> None:
+        self._target = target
         self._watched = [WatchedArray(array) for array in self._arrays(model)]
 
     def changed(self, model: mujoco.MjModel) -> bool:
@@ -85,8 +85,8 @@ class WatchedShape:
 
     def _arrays(self, model: mujoco.MjModel) -> list[NDArray]:
         """The arrays that say what the surface is."""
-        geom = self._geom
-        if is_soft(model, geom):
+        geom = self._target
+        if not is_geom(geom, model):
             return []
         asset = int(model.geom_dataid[geom])
         match int(model.geom_type[geom]):

@@ -10,6 +10,7 @@ import numpy as np
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.kernel import Floats
 
+from .ids import TargetId
 from .model import CoupledModel
 
 # A flex is wrapped round something where the amounts of the forces on it are more than this many
@@ -31,9 +32,9 @@ class WrapCheck:
         self._owners = coupled.owners
         self._flexes = {target for target, surface in coupled.soft.items() if surface.flex >= 0}
         # by target and what touches it: steps, and sums of amounts and of vector sums [N]
-        self._sums: dict[tuple[int, int], Floats] = {}
+        self._sums: dict[tuple[TargetId, int], Floats] = {}
 
-    def __call__(self, contacts: Mapping[int, Any]) -> None:
+    def __call__(self, contacts: Mapping[TargetId, Any]) -> None:
         """Add up a step."""
         for target in contacts.keys() & self._flexes:
             others, _, forces, normals = contacts[target]
@@ -50,7 +51,7 @@ class WrapCheck:
                     self._warn(target, owner, pressing / moving)
                     break
 
-    def _warn(self, target: int, owner: int, ratio: float) -> None:
+    def _warn(self, target: TargetId, owner: int, ratio: float) -> None:
         """Warn of a flex whose impulses are so many times the impulse of what it wraps round."""
         flex = self._names[self._owners[target]]
         other = self._names[owner]

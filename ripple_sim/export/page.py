@@ -23,8 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ripple_sim.coupling.ids import GeomId, is_geom
 from ripple_sim.coupling.ripples import Impulse
-from ripple_sim.coupling.soft import is_soft, target_pose
+from ripple_sim.coupling.soft import target_pose
 from ripple_sim.encode.replace import MARK, made_here
 from ripple_sim.overlay.color_map import color_table
 from ripple_sim.render.passes.floor import find_floor
@@ -93,7 +94,7 @@ def target_part(source: Source, name: str, mesh: MovingMesh) -> PagePart:
     model = source.model
     geom = source.ripples.geom_ids[name]
     finish, uv = target_finish(source, name, mesh)
-    soft = is_soft(model, geom)  # and so in the world
+    soft = not is_geom(geom, model)  # and so in the world
     meta = {
         "name": name,
         "target": True,
@@ -105,7 +106,7 @@ def target_part(source: Source, name: str, mesh: MovingMesh) -> PagePart:
     return _part(meta, finish, mesh.F, [mesh.rest, mesh.directions], uv)
 
 
-def floor_of(model: mujoco.MjModel, geom: int) -> dict[str, Any]:
+def floor_of(model: mujoco.MjModel, geom: GeomId) -> dict[str, Any]:
     """The floor: height, albedo and texture."""
     visual = geom_visual(model, geom)
     mapping = mapping_of(model, visual)
@@ -376,7 +377,7 @@ class PageWriter(Writer):
         model = self._source.model
         targets = set(source.ripples.geom_ids.values())
         floor = find_floor(model, targets)
-        left_out = targets if floor is None else {*targets, floor}
+        left_out = targets if floor is None else targets | {floor}
         parts = [target.part for target in self._targets.values()]
         parts += [_solid_part(solid) for solid in solids(model, left_out, _SEGMENTS)]
         aspect = source.size[0] / source.size[1]

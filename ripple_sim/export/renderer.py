@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ripple_sim.capture.frame_source import surface_of
 from ripple_sim.capture.snapshot import ShownWaves, drawn_heights
 from ripple_sim.coupling.geoms import ByGeom, by_name
+from ripple_sim.coupling.ids import TargetId
 from ripple_sim.coupling.own_model import check_targets, own_data, own_model, posed
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RenderError, SceneError
@@ -142,7 +143,7 @@ class RippleRenderer:
         self._told_flags = set[int]()
         self._shows = "colours"
         self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
-        self._drawn: tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint] | None = None
+        self._drawn: tuple[mujoco.MjData, dict[TargetId, AnyHeightMap], Viewpoint] | None = None
         self._camera_taken: list[object] = []
         self._lights_taken: list[object] = []
         self._gl = gl or shared_context()
@@ -369,7 +370,7 @@ class RippleRenderer:
             )
         self._renderer.upload(kind, index)
 
-    def _now(self) -> tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint]:
+    def _now(self) -> tuple[mujoco.MjData, dict[TargetId, AnyHeightMap], Viewpoint]:
         """Bodies and waves as they were taken in, and the scene's camera as it is now."""
         if self._drawn is None:
             raise RenderError(

@@ -21,8 +21,8 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
 from ripple_sim.capture.scene_camera import focal_distance
 from ripple_sim.capture.snapshot import state_digest
 from ripple_sim.coupling.geoms import target_name
+from ripple_sim.coupling.ids import is_geom
 from ripple_sim.coupling.ripples import Impulse
-from ripple_sim.coupling.soft import is_soft
 from ripple_sim.encode.part import Part
 from ripple_sim.encode.replace import MARK
 from ripple_sim.errors import VideoError
@@ -338,7 +338,7 @@ class UsdWriter:
         geom = source.ripples.geom_ids[name]
         surface = source.mesh(name)
         atlas = source.ripples[name].rest
-        soft = is_soft(model, geom)
+        soft = not is_geom(geom, model)
         finish, uv = target_finish(source, name, surface)
         uv = surface.uv if uv is None else uv
         body = self._bodies[0 if soft else int(model.geom_bodyid[geom])]

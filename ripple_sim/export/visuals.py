@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.ids import TargetId
 from ripple_sim.render.contract import MappingKind
 from ripple_sim.render.surfaces.surface import painted
 from ripple_sim.render.tone_mapping import srgb_to_linear
@@ -18,8 +19,8 @@ from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
 from ripple_sim.render.visuals.visual import (
     Look,
     Visual,
-    geom_visual,
     look_of,
+    target_visual,
     texture_pixels,
     visible_geoms,
 )
@@ -74,10 +75,10 @@ class Finish(NamedTuple):
     texture: int
 
 
-def solids(model: mujoco.MjModel, targets: set[int], segments: int = 12) -> list[Solid]:
+def solids(model: mujoco.MjModel, targets: set[TargetId], segments: int = 12) -> list[Solid]:
     """Everything that is drawn of a model, except its targets.
 
-    `targets` are geom ids; `segments` is the number of edges of round shapes to a right angle.
+    `segments` is the number of edges of round shapes to a right angle.
     """
     geoms = [geom for geom in visible_geoms(model) if geom not in targets]
     return [_solid(model, visual, make(segments)) for visual, (_, make) in visuals_of(model, geoms)]
@@ -95,7 +96,7 @@ def target_finish(
     finish = _finish(model, *painted(model, geom, *source.paints[name], mesh.uv is not None))
     if finish.texture < 0:
         return finish, None
-    mapping = mapping_of(model, geom_visual(model, geom))
+    mapping = mapping_of(model, target_visual(model, geom))
     if not mapping.own or mesh.uv is None:
         return finish, texture_places(mapping, mapping.at(mesh.rest.astype(np.float64))[mesh.F])
     # v from the upper edge

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.ids import TargetId
 from ripple_sim.coupling.soft import target_pose
 from ripple_sim.render.surfaces.surface import Surface
 from ripple_sim.render.visuals.geoms import Instances, instances_of
@@ -30,7 +31,7 @@ class DrawnScene:
     Parameters
     ----------
     targets : mapping
-        Geom id to the surface that is drawn in place of the geom.
+        Target to the surface that is drawn in place of it.
     size : (width, height)
         Size of the frame [pixels].
 
@@ -42,7 +43,7 @@ class DrawnScene:
     """
 
     def __init__(
-        self, assets: Assets, targets: Mapping[int, Surface], size: tuple[int, int]
+        self, assets: Assets, targets: Mapping[TargetId, Surface], size: tuple[int, int]
     ) -> None:
         self._assets = assets
         self._model = assets.model
@@ -61,8 +62,8 @@ class DrawnScene:
     def show(
         self,
         visuals: list[tuple[Visual, NamedShape]],
-        paints: Mapping[int, Visual] | None = None,
-        hidden: Sequence[int] = (),
+        paints: Mapping[TargetId, Visual] | None = None,
+        hidden: Sequence[TargetId] = (),
     ) -> None:
         """Choose what is drawn from now on.
 
@@ -71,9 +72,9 @@ class DrawnScene:
         visuals : list of (Visual, NamedShape)
             Everything except targets and the floor.
         paints : mapping, optional
-            Geom id of a target to the visual with its colour and material.
-        hidden : sequence of int
-            Geom ids of targets that are not drawn.
+            Target to the visual with its colour and material.
+        hidden : sequence of TargetId
+            Targets that are not drawn.
         """
         of_geoms = [visual for visual, _ in visuals if visual.index >= 0 and not visual.site]
         plane = mujoco.mjtGeom.mjGEOM_PLANE
@@ -100,7 +101,7 @@ class DrawnScene:
             CasterMap.TRANSMISSION: [drawable for drawable in casters if not drawable.blocks],
         }
 
-    def target(self, geom: int) -> SurfaceMesh:
+    def target(self, geom: TargetId) -> SurfaceMesh:
         """The target of a geom; raises `RippleError` if the geom is no target."""
         for target in self.targets:
             if target.geom == geom:
@@ -112,7 +113,7 @@ class DrawnScene:
         self,
         ctx: moderngl.Context,
         data: Any,
-        height_maps: Mapping[int, AnyHeightMap],
+        height_maps: Mapping[TargetId, AnyHeightMap],
         pose: Pose,
         sharp: bool = False,
     ) -> None:

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.ids import TargetId
 from ripple_sim.render.passes.deferred import DeferredShading, Mirror, TransparentLayers
 from ripple_sim.render.passes.floor import Floor, find_floor
 from ripple_sim.render.passes.floor_occlusion import FloorOcclusion
@@ -61,7 +62,7 @@ class _Passes(NamedTuple):
     mirror: Mirror | None
 
 
-def _check_screen_colors(targets: Mapping[int, Surface]) -> None:
+def _check_screen_colors(targets: Mapping[TargetId, Surface]) -> None:
     """Raise `RippleError` if a target shows a heatmap or a grid, which linear frames cannot."""
     for surface in targets.values():
         if surface.heatmap_colors is not None or surface.grid:
@@ -116,7 +117,7 @@ class Renderer:
         self,
         gl: GLContext,
         model: Any,
-        targets: Mapping[int, Surface],
+        targets: Mapping[TargetId, Surface],
         *,
         size: tuple[int, int],
         samples: int = 4,
@@ -260,7 +261,7 @@ class Renderer:
         with self._gl:
             self._assets.upload(kind, index)
 
-    def set_heatmap(self, geom: int, values: NDArray[np.float32], limit: float) -> None:
+    def set_heatmap(self, geom: TargetId, values: NDArray[np.float32], limit: float) -> None:
         """Set the field that a target with `heatmap_colors` shows.
 
         Parameters
@@ -283,7 +284,7 @@ class Renderer:
     def render(
         self,
         data: Any,
-        height_maps: Mapping[int, AnyHeightMap],
+        height_maps: Mapping[TargetId, AnyHeightMap],
         camera: Viewpoint,
         exposure: int = 0,
         scene: mujoco.MjvScene | None = None,
@@ -326,7 +327,7 @@ class Renderer:
     def submit(
         self,
         data: Any,
-        height_maps: Mapping[int, AnyHeightMap],
+        height_maps: Mapping[TargetId, AnyHeightMap],
         camera: Viewpoint,
         exposure: int = 0,
         scene: mujoco.MjvScene | None = None,
@@ -346,7 +347,7 @@ class Renderer:
     def draw(
         self,
         data: Any,
-        height_maps: Mapping[int, AnyHeightMap],
+        height_maps: Mapping[TargetId, AnyHeightMap],
         camera: Viewpoint,
         exposure: int = 0,
         scene: mujoco.MjvScene | None = None,
@@ -431,7 +432,7 @@ class Renderer:
     def surfaces(
         self,
         data: Any,
-        height_maps: Mapping[int, AnyHeightMap],
+        height_maps: Mapping[TargetId, AnyHeightMap],
         camera: Viewpoint,
         size: tuple[int, int] | None = None,
         scene: mujoco.MjvScene | None = None,

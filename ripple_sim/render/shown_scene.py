@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import target_name
+from ripple_sim.coupling.ids import GeomId, TargetId, is_geom
 from ripple_sim.coupling.model import find_flex_colliders
-from ripple_sim.coupling.soft import is_soft
 
 from .visuals.geoms import shaped
 from .visuals.objects import Assets
@@ -30,7 +30,7 @@ from .visuals.scene_entries import (
     visuals_in,
 )
 from .visuals.shapes import NamedShape
-from .visuals.visual import WALLS, Visual, geom_visual
+from .visuals.visual import WALLS, Visual, geom_visual, target_visual
 
 # Opacity from which MuJoCo draws an object as opaque.
 _MIN_OPAQUE = 0.995
@@ -60,25 +60,25 @@ class ShownScene:
     ----------
     visuals : list of (Visual, NamedShape)
         Everything except targets and floor.
-    targets : dict of int to Visual
-        Visuals of the targets that the scene contains, by geom id.
+    targets : dict of TargetId to Visual
+        Visuals of the targets that the scene contains.
     floor : Visual, optional
         Visual of the floor, if the scene contains it.
-    hidden : list of int
+    hidden : list of TargetId
         Targets that are not drawn.
     left_out : set of str
         Descriptions of things that are not drawn as the scene has them.
     """
 
     def __init__(
-        self, model: Any, targets: Iterable[int], floor: int | None, cut_out: bool = False
+        self, model: Any, targets: Iterable[TargetId], floor: GeomId | None, cut_out: bool = False
     ) -> None:
         self._model = model
         self._cut_out = cut_out
         # targets by identity, and their visuals in the model
-        self._targets = {geom_visual(model, target).identity: target for target in targets}
+        self._targets = {target_visual(model, target).identity: target for target in targets}
         self._model_visuals = {
-            target: geom_visual(model, target) for target in self._targets.values()
+            target: target_visual(model, target) for target in self._targets.values()
         }
         self._floor = None if floor is None else geom_visual(model, floor)
         flex = int(mujoco.mjtObj.mjOBJ_FLEX)
@@ -88,9 +88,9 @@ class ShownScene:
         # visuals that are not of the model, and the entries that they follow
         self._placed: list[tuple[Visual, mujoco.MjvGeom]] = []
         self.visuals: list[tuple[Visual, NamedShape]] = []
-        self.targets: dict[int, Visual] = {}
+        self.targets: dict[TargetId, Visual] = {}
         self.floor: Visual | None = None
-        self.hidden: list[int] = []
+        self.hidden: list[TargetId] = []
         self.left_out: set[str] = set()
 
     def read(
@@ -195,7 +195,7 @@ class ShownScene:
     def _ripples(self, entry: mujoco.MjvGeom) -> bool:
         """Whether an entry of a target still has the shape of the rippling surface."""
         target = self._targets[identity_of(entry)]
-        if is_soft(self._model, target):
+        if not is_geom(target, self._model):
             return True
         in_model = self._model_visuals[target]
         in_scene = own_visual(self._model, entry)
@@ -212,16 +212,16 @@ class ShownScene:
             )
         return has_same_shape
 
-    def _take_target(self, target: int, entry: mujoco.MjvGeom) -> None:
+    def _take_target(self, target: TargetId, entry: mujoco.MjvGeom) -> None:
         """Add a target with the colour and material of its entry."""
         paint: dict[str, Any] = {
             "rgba": np.array(entry.rgba, dtype=np.float64),
             "material": int(entry.matid),
         }
-        if is_soft(self._model, target):
-            visual = replace(geom_visual(self._model, target), **paint)
-        else:
+        if is_geom(target, self._model):
             visual = own_visual(self._model, entry)
+        else:
+            visual = replace(target_visual(self._model, target), **paint)
         self.targets[target] = self._as_seen(visual, entry)
 
     def _is_floor(self, entry: mujoco.MjvGeom) -> bool:

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.soft import is_soft
+from ripple_sim.coupling.ids import TargetId, is_geom
 from ripple_sim.render.surfaces.adaptive import (
     AdaptiveTessellation,
     DeviceTessellation,
@@ -19,7 +19,7 @@ from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearan
 from ripple_sim.render.surfaces.tessellation import BAKED, DIRECTION, NORMAL, POSITION
 from ripple_sim.render.surfaces.vertices import mapped_coordinates, surface_vertices
 from ripple_sim.render.visuals.objects import Assets, Occluders
-from ripple_sim.render.visuals.visual import Visual, geom_visual
+from ripple_sim.render.visuals.visual import Visual, target_visual
 from ripple_sim.solver.errors import RippleError
 
 from .bounds import balls_about
@@ -86,7 +86,7 @@ class SurfaceMesh:
     def __init__(
         self,
         assets: Assets,
-        geom: int,
+        geom: TargetId,
         surface: Surface,
         height_maps: HeightMapTextures,
         index: int,
@@ -106,11 +106,11 @@ class SurfaceMesh:
         self._shape = (page.charts, page.block, page.block, 4)  # of the height map
         # middle of the ball about the target: a geom's origin, or the middle of a soft mesh [m]
         self._middle = np.zeros(3)
-        if is_soft(assets.model, geom):
+        if not is_geom(geom, assets.model):
             self._middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
         self._radius = float(np.linalg.norm(surface.V - self._middle, axis=1).max())  # at rest [m]
         self._reach = self._radius  # of the ball about the mesh, as far as it has moved [m]
-        visual = geom_visual(assets.model, geom)
+        visual = target_visual(assets.model, geom)
         look, _, mapping = appearance(assets.model, visual, surface)
         self.occludes = True
         self.casts = True

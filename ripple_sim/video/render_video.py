@@ -24,6 +24,7 @@ from ripple_sim.capture.sighting import Sighting, passes_of
 from ripple_sim.capture.snapshot import Snapshot, snapshots
 from ripple_sim.coupling.geoms import geom_name
 from ripple_sim.coupling.hooks import adopt_warnings
+from ripple_sim.coupling.ids import geom_id, is_geom
 from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.encode.part import Settings
 from ripple_sim.encode.passes import PassFiles
@@ -149,10 +150,10 @@ class Film:
         model = self.simulations[0].model
         # name of each number of the segmentation: of geoms, and of soft targets, which come after
         segments = {0: "background"}
-        for geom in range(model.ngeom):
+        for geom in map(geom_id, range(model.ngeom)):
             segments[geom + 1] = geom_name(model, geom)
         for name, target in self.simulations[0].ripples.geom_ids.items():
-            if target >= model.ngeom:
+            if not is_geom(target, model):
                 segments[target + 1] = name
         self._pass_files = PassFiles(
             output, self._options.pass_format, segments, frames, self._options.overwrite

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.geoms import find_target
-from ripple_sim.coupling.soft import SoftSurface, is_soft
+from ripple_sim.coupling.ids import is_geom
+from ripple_sim.coupling.soft import SoftSurface
 from ripple_sim.coupling.suited import suited_targets
 from ripple_sim.scene.drop import drop_scene, is_scene
 from ripple_sim.scene.loading import load_scene
@@ -204,12 +205,10 @@ def surface_size(scene: Scene) -> float:
     model = scene.model
     extents = []
     for target in (find_target(model, entry.geom) for entry in scene.targets):
-        soft = is_soft(model, target)
-        extent = (
-            np.ptp(SoftSurface(model, target).mesh.V, axis=0)
-            if soft
-            else 2 * model.geom_aabb[target, 3:]
-        )
+        if is_geom(target, model):
+            extent = 2 * model.geom_aabb[target, 3:]
+        else:
+            extent = np.ptp(SoftSurface(model, target).mesh.V, axis=0)
         extents.append(float(extent.max()))
     return min(extents)
 

@@ -10,9 +10,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.ids import TargetId, flex_of, is_geom, skin_of
 from ripple_sim.coupling.own_model import own_data, own_model
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.coupling.soft import first_flex, first_skin, is_soft, target_pose
+from ripple_sim.coupling.soft import target_pose
 from ripple_sim.errors import DisplayError, SceneError
 from ripple_sim.render.visuals.corners import normalized, smooth_normals
 from ripple_sim.solver import WaveSolver
@@ -157,11 +158,9 @@ class RippleViewer:
                 for geom, *place in zip(scene.geoms[first : scene.ngeom], *triangles, strict=False):
                     mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_TRIANGLE, *place, rgba)
                     geom.category = mujoco.mjtCatBit.mjCAT_DYNAMIC  # others cast no shadows
-                hidden = [
-                    colors,
-                    materials,
-                    *([] if is_soft(model, target) else [model.geom_size[target]]),
-                ]
+                hidden: list[NDArray[Any]] = [colors, materials]
+                if is_geom(target, model):
+                    hidden.append(model.geom_size[target])
                 kept += [(array, array.copy()) for array in hidden]
                 # The mouse does not find what has no material and no opacity; with some it casts
                 # shadows, but within.
@@ -201,7 +200,7 @@ class RippleViewer:
         body = pull.select
         point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ pull.localpos
         for name, target in self._ripples.geom_ids.items():
-            if is_soft(model, target) or model.geom_bodyid[target] != body:
+            if not is_geom(target, model) or model.geom_bodyid[target] != body:
                 continue
             waves = self._ripples[name]
             position, rotation = target_pose(data, target)
@@ -225,14 +224,14 @@ class RippleViewer:
         self.close()
 
 
-def _look(model: mujoco.MjModel, target: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+def _look(model: mujoco.MjModel, target: TargetId) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Materials of a target, -1 if it has none, and its colour in the model: views."""
-    if not is_soft(model, target):
+    if is_geom(target, model):
         return model.geom_matid[target : target + 1], model.geom_rgba[target]
-    skin = target - first_skin(model)
+    skin = skin_of(model, target)
     if skin >= 0:
         return model.skin_matid[skin : skin + 1], model.skin_rgba[skin]
-    flex = target - first_flex(model)
+    flex = flex_of(model, target)
     first = flex
     count = 1
     if len(model.flex_matid) != model.nflex:  # MuJoCo 4 has one for each element

@@ -13,7 +13,8 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from ripple_sim.capture.scene_camera import viewpoint
-from ripple_sim.coupling.soft import is_soft, target_pose
+from ripple_sim.coupling.ids import GeomId, is_geom
+from ripple_sim.coupling.soft import target_pose
 from ripple_sim.export.moving_mesh import Displaced
 from ripple_sim.overlay.scales import round_up
 from ripple_sim.render.passes.floor import find_floor
@@ -69,7 +70,7 @@ _SHADOW_SIDES = 32
 _REACH = 4.0
 
 
-def is_endless(model: mujoco.MjModel, geom: int, reach: float) -> bool:
+def is_endless(model: mujoco.MjModel, geom: GeomId, reach: float) -> bool:
     """Whether a geom is a plane that is infinite or extends beyond the view."""
     size = model.geom_size[geom, :2]
     return model.geom_type[geom] == _PLANE and bool(((size <= 0) | (size > reach / 2)).all())
@@ -121,7 +122,7 @@ class BodyActors:
         self.update()
 
     @property
-    def solid(self) -> list[int]:
+    def solid(self) -> list[GeomId]:
         """Visible geoms except planes."""
         kinds = self._session.simulation.model.geom_type
         return [geom for geom in self._actors if kinds[geom] != _PLANE]
@@ -190,7 +191,7 @@ class SkinActor:
             mapper.scalar_range = (-_PER_METRE * limit, _PER_METRE * limit)
 
 
-def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
+def geom_mesh(model: mujoco.MjModel, geom: GeomId) -> pv.PolyData | None:
     """Surface of a geom in its frame [m], with normals; None for types that cannot be drawn."""
     visual = geom_visual(model, geom)
     if (found := shape_of(model, visual)) is None:
@@ -209,9 +210,11 @@ def _place(actor: pv.Actor, position: NDArray[np.float64], rotation: NDArray[np.
 
 
 class Shadows:
-    """A shadow for each of some geoms on a horizontal plane, the `floor`; all by their geom ids."""
+    """A shadow for each of some geoms on a horizontal plane, the `floor`."""
 
-    def __init__(self, plotter: pv.Plotter, session: Session, geoms: list[int], floor: int) -> None:
+    def __init__(
+        self, plotter: pv.Plotter, session: Session, geoms: list[GeomId], floor: GeomId
+    ) -> None:
         self._session = session
         self._floor = floor
         disc = pv.Disc(
@@ -292,9 +295,7 @@ class Stage:
         self._bodies = BodyActors(plotter, session, pose.focus, _REACH * pose.distance)
         floor = find_floor(simulation.model, simulation.ripples.geom_ids.values())
         rigid = [
-            geom
-            for geom in simulation.ripples.geom_ids.values()
-            if not is_soft(simulation.model, geom)
+            geom for geom in simulation.ripples.geom_ids.values() if is_geom(geom, simulation.model)
         ]
         self.shadows: Shadows | None = None
         if floor is not None and simulation.data.geom_xmat[floor, 8] > _MIN_LEVEL_COSINE:

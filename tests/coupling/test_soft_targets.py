@@ -9,7 +9,7 @@ from hits import Run, contact_forces
 from numpy.testing import assert_allclose
 
 from ripple_sim import Ripples, Target
-from ripple_sim.coupling import HighPass, SoftSurface, coarse_motions, first_flex
+from ripple_sim.coupling import HighPass, SoftSurface, coarse_motions, target_of_flex
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Load, Material
 
@@ -190,7 +190,7 @@ def flexed(dof: str) -> tuple[mujoco.MjModel, Ripples, SoftSurface]:
     ripples = Ripples(
         model, {"jelly": Target(Material(speed=1.0, density=5.0), high_pass=True)}, resolution=8
     )
-    return model, ripples, SoftSurface(model, first_flex(model))
+    return model, ripples, SoftSurface(model, target_of_flex(model, 0))
 
 
 @pytest.mark.parametrize("dof", ["full", "trilinear"])

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ripple_sim.coupling import TARGET_TYPES, find_geom, find_target, is_soft, target_atlas
+from ripple_sim.coupling import TARGET_TYPES, find_geom, find_target, is_geom, target_atlas
 from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.scene import load_scene, shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, shipped_sphere_map, sphere_map_path
@@ -21,7 +21,7 @@ def meshes() -> list[Mesh]:
         scene = load_scene(name)
         for target in scene.targets:
             geom = find_target(scene.model, target.geom)
-            if is_soft(scene.model, geom):
+            if not is_geom(geom, scene.model):
                 continue
             mesh = target_mesh(scene.model, geom)
             if (

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.ids import GeomId, TargetId
 from ripple_sim.render.bounds import enclosing
 from ripple_sim.render.contract import MappingKind, Unit
 from ripple_sim.render.frame_uniforms import FrameUniforms
@@ -39,8 +40,8 @@ _MIN_SINE_OF_LIGHT = 0.02
 _CUBE_CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 3)
 
 
-def find_floor(model: Any, targets: Collection[int]) -> int | None:
-    """Geom id of the plane under everything else, or None.
+def find_floor(model: Any, targets: Collection[TargetId]) -> GeomId | None:
+    """The plane under everything else, or None.
 
     The floor is a visible plane that faces up, is infinite or large, and is no target. A table's
     top is no floor. Of several planes an opaque one is preferred, then an infinite one, then the
@@ -48,25 +49,28 @@ def find_floor(model: Any, targets: Collection[int]) -> int | None:
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    visible = np.array(visible_geoms(model), dtype=np.int64)
-    is_plane = model.geom_type[visible] == mujoco.mjtGeom.mjGEOM_PLANE
-    size_of_others = _size_of_geoms(model, data, visible[~is_plane])
+    planes: list[GeomId] = []
+    others: list[GeomId] = []
+    for geom in visible_geoms(model):
+        is_plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+        (planes if is_plane else others).append(geom)
+    size_of_others = _size_of_geoms(model, data, np.array(others, dtype=np.int64))
     half_sizes = model.geom_size[:, :2]  # 0 along an axis along which a plane is infinite
     upness = data.geom_xmat[:, 8]  # vertical part of the geoms' z axes, the normals of planes
 
-    def is_ground(plane: int) -> bool:
+    def is_ground(plane: GeomId) -> bool:
         half_size = half_sizes[plane]
         min_half_size = np.where(half_size > 0, _MIN_HALF_SIZE * size_of_others, 0.0)
         is_large = bool((half_size >= min_half_size).all())
         faces_up = bool(upness[plane] > _MIN_NORMAL_UP)
         return is_large and faces_up and plane not in targets
 
-    def preference(plane: int) -> tuple[bool, bool, float, float]:
+    def preference(plane: GeomId) -> tuple[bool, bool, float, float]:
         is_opaque = geom_visual(model, plane).opacity == 1.0
         is_endless = not half_sizes[plane].any()
         return is_opaque, is_endless, round(upness[plane], 3), data.geom_xpos[plane, 2]
 
-    grounds = [plane for plane in visible[is_plane].tolist() if is_ground(plane)]
+    grounds = [plane for plane in planes if is_ground(plane)]
     return max(grounds, key=preference, default=None)
 
 
@@ -115,7 +119,7 @@ class Floor:
         Half the width of the square [m].
     """
 
-    def __init__(self, assets: Assets, geom: int) -> None:
+    def __init__(self, assets: Assets, geom: GeomId) -> None:
         self.geom = geom
         self._assets = assets
         self.shown = True

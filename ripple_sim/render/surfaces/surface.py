@@ -12,6 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.ids import TargetId
 from ripple_sim.render.contract import MappingKind, Unit
 from ripple_sim.render.height_map_textures import write_page
 from ripple_sim.render.resources import Resources
@@ -22,8 +23,8 @@ from ripple_sim.render.visuals.visual import (
     Look,
     Visual,
     find_look,
-    geom_visual,
     look_of,
+    target_visual,
 )
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.errors import RippleError
@@ -230,7 +231,7 @@ def appearance(
 
 
 def painted(
-    model: Any, geom: int, look: str, color: tuple[float, float, float] | None, has_uv: bool
+    model: Any, target: TargetId, look: str, color: tuple[float, float, float] | None, has_uv: bool
 ) -> tuple[Look, NDArray[np.float64], TextureMapping]:
     """Look, linear colour under the texture, and texture mapping of a target.
 
@@ -243,7 +244,7 @@ def painted(
     has_uv : bool
         Whether the target has texture coordinates of its own.
     """
-    return _painted(model, geom_visual(model, geom), look, color, has_uv)
+    return _painted(model, target_visual(model, target), look, color, has_uv)
 
 
 def _painted(
@@ -263,13 +264,13 @@ def _painted(
 
 
 def target_color(
-    model: Any, geom: int, look: str, given: tuple[float, float, float] | None
+    model: Any, target: TargetId, look: str, given: tuple[float, float, float] | None
 ) -> NDArray[np.float64]:
     """Colour of a target without its texture, sRGB [3].
 
     It is the given colour, or else the model's, or else the look's.
     """
-    return _own_color(model, geom_visual(model, geom), look, given)
+    return _own_color(model, target_visual(model, target), look, given)
 
 
 def _own_color(

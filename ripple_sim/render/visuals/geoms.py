@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.ids import GeomId
 from ripple_sim.render.contract import CasterMap
 from ripple_sim.render.pose import Pose
 from ripple_sim.render.resources import Resources
@@ -314,7 +315,7 @@ def _segments(
     return np.array(levels)[np.minimum(np.searchsorted(levels, needed), len(levels) - 1)]
 
 
-def visuals_of(model: Any, geoms: Iterable[int]) -> list[tuple[Visual, NamedShape]]:
+def visuals_of(model: Any, geoms: Iterable[GeomId]) -> list[tuple[Visual, NamedShape]]:
     """The given geoms of a model and its visible sites that have a shape, each with its shape."""
     visuals = [geom_visual(model, geom) for geom in geoms]
     visuals += [site_visual(model, site) for site in visible_sites(model)]

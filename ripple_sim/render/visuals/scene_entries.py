@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.ids import geom_id
 from ripple_sim.coupling.target_mesh import height_field_triangles, mesh_arrays
 
 from .flexes import flex_parts
@@ -121,7 +122,8 @@ def own_visual(
     was compiled.
     """
     site = entry.objtype == SITE_OBJECT
-    visual = (site_visual if site else geom_visual)(model, int(entry.objid))
+    number = int(entry.objid)
+    visual = site_visual(model, number) if site else geom_visual(model, geom_id(number))
     kind = int(entry.type)
     size = np.array(entry.size)
     asset = _asset_of(model, entry)

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.soft import first_flex, first_skin, is_soft
+from ripple_sim.coupling.ids import GeomId, TargetId, flex_of, geom_id, is_geom, skin_of
 from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.solver.errors import RippleError
 
@@ -217,20 +217,24 @@ class Visual:
                 return self.size
 
 
-def geom_visual(model: Any, geom: int) -> Visual:
-    """Geom of a model, or a soft target, see `find_soft`."""
-    if is_soft(model, geom):
-        skin = geom - first_skin(model)
-        if skin >= 0:
-            identity = skin, int(mujoco.mjtObj.mjOBJ_SKIN)
-            paint = _paint(model, "skin", skin)
-        else:
-            flex = geom - first_flex(model)
-            identity = flex, int(mujoco.mjtObj.mjOBJ_FLEX)
-            paint = _paint(model, "flex", flex)
-        return Visual(
-            False, geom, int(_GEOM.mjGEOM_MESH), np.ones(3), -1, *paint, identity=identity
-        )
+def target_visual(model: Any, target: TargetId) -> Visual:
+    """Visual of a geom, a flex or a skin."""
+    if is_geom(target, model):
+        return geom_visual(model, target)
+    number: int = skin_of(model, target)
+    if number >= 0:
+        identity = number, int(mujoco.mjtObj.mjOBJ_SKIN)
+        paint = _paint(model, "skin", number)
+    else:
+        number = flex_of(model, target)
+        identity = number, int(mujoco.mjtObj.mjOBJ_FLEX)
+        paint = _paint(model, "flex", number)
+    kind = int(_GEOM.mjGEOM_MESH)
+    return Visual(False, target, kind, np.ones(3), -1, *paint, identity=identity)
+
+
+def geom_visual(model: Any, geom: GeomId) -> Visual:
+    """Visual of a geom of a model."""
     kind = int(model.geom_type[geom])
     size = np.array(model.geom_size[geom], dtype=np.float64)
     asset = int(model.geom_dataid[geom])
@@ -239,14 +243,14 @@ def geom_visual(model: Any, geom: int) -> Visual:
 
 
 def paint_of(
-    model: Any, geom: int, look: str | None
+    model: Any, target: TargetId, look: str | None
 ) -> tuple[str, tuple[float, float, float] | None]:
     """Look of a target in a model of the user's, and its sRGB colour.
 
     The colour is None where the model or the look has one. A target without look and colour is
     rubber in the grey of MuJoCo's geoms without a colour.
     """
-    visual = geom_visual(model, geom)
+    visual = target_visual(model, target)
     red, green, blue = visual.rgba[:3].tolist()
     is_grey = look is None and not visual.colored
     return look or "rubber", (red, green, blue) if is_grey else None
@@ -270,9 +274,10 @@ def _paint(model: Any, which: str, index: int) -> tuple[NDArray[np.float64], int
     return np.array(rgba, dtype=np.float64), int(material), int(group)
 
 
-def visible_geoms(model: Any) -> list[int]:
-    """Ids of the geoms that MuJoCo shows by default."""
-    return [geom for geom in range(model.ngeom) if geom_visual(model, geom).visible]
+def visible_geoms(model: Any) -> list[GeomId]:
+    """The geoms that MuJoCo shows by default."""
+    geoms = map(geom_id, range(model.ngeom))
+    return [geom for geom in geoms if geom_visual(model, geom).visible]
 
 
 def visible_sites(model: Any) -> list[int]:
