@@ -1,4 +1,4 @@
-from .backend import Backend as Backend
+from .backend import Backend as Backend, TexelLoad as TexelLoad
 from .backend_speed import measured as measured
 from .choice import auto_backend as auto_backend, make_backend as make_backend
 from .cpu import CPUBackend as CPUBackend, RowLayout as RowLayout

@@ -6,7 +6,7 @@ below. `make_backend` makes one by name.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,28 @@ from numpy.typing import NDArray
 from ..operator.wave_operator import WaveOperator
 from .gl_fields import DeviceField
 from .kernels import Amplitude, Probes
+from .surface_fields import SurfaceFields
+
+
+class TexelLoad(NamedTuple):
+    """Forces that act on a surface until others take their place.
+
+    Attributes
+    ----------
+    texels : int64 [k]
+        Flat texel indices, each once.
+    forces : float64 [k]
+        On these texels [N].
+    acceleration : Amplitude
+        Of all texels, as they respond [m/s^2].
+    """
+
+    texels: NDArray[np.int64]
+    forces: NDArray[np.float64]
+    acceleration: Amplitude
+
+
+NO_LOAD = TexelLoad(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
 
 class Backend(Protocol):
@@ -28,22 +50,19 @@ class Backend(Protocol):
         "gl" or "cpu".
     keeps_volume : bool or None
         See `WaveSolver.conserve_volume`; may be changed between steps.
+    fields : SurfaceFields
+        The height is read and replaced there; the velocity here, since kicks may be only noted.
     """
 
     name: str
     keeps_volume: bool | None
-
-    def height(self) -> NDArray[np.float32]:
-        """Copy of the height [m]."""
-
-    def elastic(self) -> NDArray[np.float32]:
-        """Copy of the part of the height that springs back [m]."""
-
-    def dent(self) -> NDArray[np.float32]:
-        """Copy of the part of the height that stays [m]."""
+    fields: SurfaceFields[Any]
 
     def velocity(self) -> NDArray[np.float32]:
-        """Copy of the velocity [m/s]."""
+        """Copy of the velocity [m/s], with all kicks."""
+
+    def set_velocity(self, velocity: NDArray[np.float32]) -> None:
+        """Replace the velocity [m/s]; earlier kicks are gone."""
 
     def snapshot(self) -> NDArray[np.float32] | DeviceField:
         """Copy of the height [m], on the GPU where the waves are there."""
@@ -51,26 +70,13 @@ class Backend(Protocol):
     def crests(self) -> NDArray[np.float32]:
         """Greatest size of the height since the last call [m]: after any `advance`, or now."""
 
-    def set_height(
-        self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None
-    ) -> None:
-        """Replace the elastic height [m], and the permanent height [m], which is 0 by default."""
-
-    def set_velocity(self, velocity: NDArray[np.float32]) -> None:
-        """Replace the velocity [m/s]."""
-
     def kick(
         self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude
     ) -> None:
         """Add velocities [m/s] to some texels, each named once, and one to all, as they respond."""
 
-    def load(
-        self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude
-    ) -> None:
-        """Hold forces [N] on some texels, and an acceleration [m/s^2] on all.
-
-        Until the next call.
-        """
+    def hold(self, load: TexelLoad) -> None:
+        """Let a load act in every substep until the next call."""
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""

@@ -19,8 +19,8 @@ from ..operator.wave_operator import WaveOperator
 from ..texels.stencil import Stencil
 from ..texels.topology import TexelTopology
 from . import kernels
+from .backend import NO_LOAD, TexelLoad
 from .crews import Team
-from .field_backend import FieldBackend
 from .kernels import (
     NO_BALANCE,
     NO_FEATURES,
@@ -37,6 +37,7 @@ from .kernels import (
     Weights,
 )
 from .meeting import alone
+from .surface_fields import SurfaceFields
 
 # Below this resolution [texels along a side] charts lie side by side, row by row: one loop then runs
 # over a row of all charts. On charts of 12 columns, a loop for each chart takes four times as long.
@@ -237,8 +238,14 @@ def volume_balance(
     )
 
 
-class CPUBackend(FieldBackend):
-    """Height and velocity in float32 charts with halo."""
+def all_finite(height: NDArray[np.float32]) -> bool:
+    """Whether all heights of a field are finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(height.sum()))
+
+
+class CPUBackend:
+    """Height and velocity in float32 charts with halo; see `Backend`."""
 
     name = "cpu"
 
@@ -251,34 +258,61 @@ class CPUBackend(FieldBackend):
     ) -> None:
         self.keeps_volume = keeps_volume
         self._team = Team(operator.mass.size, threads)
-        self._fields = fields = RowLayout(operator.topology)
+        self._layout = layout = RowLayout(operator.topology)
         # the processor takes a store to one field and a load from another at the same place of a
         # page for a conflict: each field begins elsewhere in its page
-        self._h, self._h_next, self._v = (
-            fields.zeros(i * _PAGE_FLOATS // 3 // _LINE_FLOATS * _LINE_FLOATS) for i in range(3)
+        height, next_height, velocity = (
+            layout.zeros(i * _PAGE_FLOATS // 3 // _LINE_FLOATS * _LINE_FLOATS) for i in range(3)
         )
+        self.fields = SurfaceFields(layout, operator.topology.shape, h=height, v=velocity)
+        # room for the height of the next substep
+        self._h_next = next_height
         self._stencil = NO_WEIGHTS
         self._viscosity: Weights | None = None
         self._features = NO_FEATURES
         if isinstance(operator.bending, Bending):
-            self._features = self._features._replace(moment=fields.zeros().reshape(-1))
+            self._features = self._features._replace(moment=layout.zeros().reshape(-1))
         elif operator.bending is not None:
-            self._features = self._features._replace(squares=fields.squares(operator.bending))
+            self._features = self._features._replace(squares=layout.squares(operator.bending))
         if operator.yield_height is not None:
-            self._dent = fields.zeros()
-            limit = np.full_like(self._dent, np.inf)
-            fields.texels(limit)[:] = operator.yield_height
+            self.fields.dent = layout.zeros()
+            limit = np.full_like(height, np.inf)
+            layout.texels(limit)[:] = operator.yield_height
             self._features = self._features._replace(limit=limit.reshape(-1))
         self.move(operator)
-        self._response = fields.coefficients(number_or_field(operator.response))
-        self._part_runs = None if operator.parts is None else part_runs(operator, fields)
+        self._response = layout.coefficients(number_or_field(operator.response))
+        self._part_runs = None if operator.parts is None else part_runs(operator, layout)
         self._part_count = 1 if operator.parts is None else int(operator.parts.max()) + 1
         self._balance: Balance | None = None
         self._extra: Coefficient = np.float32(0)  # forces beside those of the stencil
         self._shift: Amplitude | None = None  # of velocities, which the next drift adds
         # step length [s] and `keeps_volume` for which the coefficients are prepared
         self._prepared = (0.0, keeps_volume)
-        self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
+        self._load = NO_LOAD
+        # the load of which the pulses are prepared
+        self._pulsed: TexelLoad | None = None
+        self._probes: kernels.Probes | None = None
+        # sums of the probes, [substeps, k]
+        self._sums = np.zeros((0, 0), np.float32)
+
+    def velocity(self) -> NDArray[np.float32]:
+        """Copy of the velocity [m/s], with all kicks."""
+        self._apply_kicks()
+        return self.fields.velocity()
+
+    def set_velocity(self, velocity: NDArray[np.float32]) -> None:
+        """Replace the velocity [m/s]; earlier kicks are gone."""
+        self.fields.set_velocity(velocity)
+        self._shift = None
+
+    def snapshot(self) -> NDArray[np.float32]:
+        """Copy of the height [m]."""
+        return self.fields.height()
+
+    def crests(self) -> NDArray[np.float32]:
+        """Greatest size of the height since the last call [m]: after any `advance`, or now."""
+        self._raise_crests(self.fields.watched_crests())
+        return self.fields.take_crests()
 
     def kick(
         self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude
@@ -287,26 +321,20 @@ class CPUBackend(FieldBackend):
 
         The velocity of all texels is only noted: the next step adds all that were noted at once.
         """
-        self._v.reshape(-1)[self._fields.addresses[texels]] += velocities
+        self.fields.v.reshape(-1)[self._layout.addresses[texels]] += velocities
         self._shift = everywhere if self._shift is None else self._shift + everywhere
 
-    def load(
-        self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude
-    ) -> None:
-        """Hold forces [N] on some texels, and an acceleration [m/s^2] on all.
-
-        Until the next call.
-        """
-        self._loaded = texels
-        self._load_forces = forces
-        self._acceleration = everywhere
-        self._load_is_new = True
+    def hold(self, load: TexelLoad) -> None:
+        """Let a load act in every substep until the next call."""
+        self._load = load
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
         coefficients = self._prepare(dt)
         acceleration = (
-            self._pressure(self._acceleration) if self._balance is None else self._balance.pressure
+            self._pressure(self._load.acceleration)
+            if self._balance is None
+            else self._balance.pressure
         )
         kick = Kick(
             stencil=self._stencil,
@@ -318,12 +346,13 @@ class CPUBackend(FieldBackend):
             acceleration=acceleration,
         )
         self._apply_kicks()
+        fields = self.fields
         state = State(
-            h=self._h.reshape(-1),
-            v=self._v.reshape(-1),
+            h=fields.h.reshape(-1),
+            v=fields.v.reshape(-1),
             h_next=self._h_next.reshape(-1),
-            dent=_NO_DENT if self._dent is None else self._dent.reshape(-1),
-            halo=self._fields.halo,
+            dent=_NO_DENT if fields.dent is None else fields.dent.reshape(-1),
+            halo=self._layout.halo,
         )
         sum_count = 0 if self._probes is None else len(self._probes.heights)
         self._sums = np.zeros((substeps, sum_count), np.float32)
@@ -345,46 +374,58 @@ class CPUBackend(FieldBackend):
         else:
             step(alone())
         if substeps % 2:
-            self._h, self._h_next = self._h_next, self._h
-        if self._crests is not None:
-            self._raise_crests()
+            fields.h, self._h_next = self._h_next, fields.h
+        if fields.crests is not None:
+            self._raise_crests(fields.crests)
 
     def probe(self, probes: kernels.Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
         if probes is not None:
-            probes = probes._replace(texels=self._fields.addresses[probes.texels])
+            probes = probes._replace(texels=self._layout.addresses[probes.texels])
         self._probes = probes
+
+    def probed(self) -> NDArray[np.float32]:
+        """The sums of the latest `advance`, [substeps, k]."""
+        return self._sums
+
+    def wait(self) -> None:
+        """Return at once: all steps are done."""
+
+    def finite(self) -> bool:
+        """Whether all heights are finite."""
+        return all_finite(self.fields.h)
 
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""
         self._operator = operator
-        fields = self._fields
-        self._stencil = fields.weights(operator.stencil, self._stencil.rows)
+        layout = self._layout
+        self._stencil = layout.weights(operator.stencil, self._stencil.rows)
         if operator.viscosity_stencil is not None:
             rows = NO_WEIGHTS.rows if self._viscosity is None else self._viscosity.rows
-            self._viscosity = fields.weights(operator.viscosity_stencil, rows)
+            self._viscosity = layout.weights(operator.viscosity_stencil, rows)
         if isinstance(operator.bending, Bending):
             self._features = self._features._replace(
-                laplace=fields.weights(operator.bending.laplace, self._features.laplace.rows),
-                rigidity=fields.coefficients(operator.bending.rigidity.astype(np.float32)),
+                laplace=layout.weights(operator.bending.laplace, self._features.laplace.rows),
+                rigidity=layout.coefficients(operator.bending.rigidity.astype(np.float32)),
             )
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
-    def _raise_crests(self) -> None:
-        # the next height is but scratch between steps
-        height = self._h if self._dent is None else np.add(self._h, self._dent, out=self._h_next)
-        np.maximum(self._crests, np.abs(height, out=self._h_next), out=self._crests)
+    def _raise_crests(self, crests: NDArray[np.float32]) -> None:
+        """Raise the crests to the size of the height where that is greater."""
+        scratch = self._h_next  # between steps it holds nothing
+        height = self.fields.h
+        if self.fields.dent is not None:
+            height = np.add(height, self.fields.dent, out=scratch)
+        np.maximum(crests, np.abs(height, out=scratch), out=crests)
 
     def _apply_kicks(self) -> None:
+        """Add the velocity of all texels that kicks have noted."""
         if self._shift is not None:
             shift = self._pressure(self._shift) * self._response
-            velocities = self._v[:, 1:-1, 1 : self._fields.columns + 1]
+            velocities = self.fields.v[:, 1:-1, 1 : self._layout.columns + 1]
             velocities += shift.reshape(velocities.shape) if shift.ndim else shift
             self._shift = None
-
-    def _drop_kicks(self) -> None:
-        self._shift = None
 
     def _pressure(self, amplitude: Amplitude) -> Coefficient:
         """An amplitude as the loops take it: a number, or a flat field for several parts."""
@@ -403,20 +444,21 @@ class CPUBackend(FieldBackend):
         if new_length:
             self._prepare_coefficients(dt)
             self._prepared = (dt, self.keeps_volume)
-        if new_length or self._load_is_new:
-            gain = self._coefficients.gain[self._fields.places[self._loaded]]
+        load = self._load
+        if new_length or load is not self._pulsed:
+            gain = self._coefficients.gain[self._layout.places[load.texels]]
             self._pulses = Pulses(
-                addresses=self._fields.addresses[self._loaded],
-                velocities=gain * self._load_forces.astype(np.float32),
+                addresses=self._layout.addresses[load.texels],
+                velocities=gain * load.forces.astype(np.float32),
             )
             if self._balance is not None:
-                self._balance.loaded[:] = self._acceleration
-            self._load_is_new = False
+                self._balance.loaded[:] = load.acceleration
+            self._pulsed = load
         return self._coefficients
 
     def _prepare_coefficients(self, dt: float) -> None:
         """Compute the coefficients of the kick for substeps of dt [s], and choose the loops."""
-        self._balance = volume_balance(self._operator, dt, self.keeps_volume, self._fields)
+        self._balance = volume_balance(self._operator, dt, self.keeps_volume, self._layout)
         self._features = features = self._features._replace(balance=self._balance or NO_BALANCE)
         k = step_coefficients(self._operator, dt)
         values: tuple[Any, ...] = (k.gain, k.decay, k.spring, k.span)
@@ -426,11 +468,11 @@ class CPUBackend(FieldBackend):
         if varied:
             values = np.broadcast_arrays(*values)
         self._coefficients = StepCoefficients(
-            *(self._fields.coefficients(value) for value in values)
+            *(self._layout.coefficients(value) for value in values)
         )
         bends = len(features.moment) > 0 or len(features.squares.force) > 0
         self._plain = not (varied or bends or len(features.limit))
         # a field where forces are added up, or the number 0
         needs_field = self._viscosity is not None or not self._plain
         if needs_field != bool(np.ndim(self._extra)):
-            self._extra = self._fields.zeros().reshape(-1) if needs_field else np.float32(0)
+            self._extra = self._layout.zeros().reshape(-1) if needs_field else np.float32(0)

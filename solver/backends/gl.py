@@ -21,7 +21,7 @@ from ..texels.moving import MovedStencil, interpolate
 from ..texels.quad_pass import LEAST_RATIO
 from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from ..texels.topology import TexelTopology
-from .field_backend import FieldBackend
+from .backend import NO_LOAD, TexelLoad
 from .gl_fields import (
     DeviceField,
     DeviceProbes,
@@ -32,6 +32,7 @@ from .gl_fields import (
     to_buffer,
 )
 from .kernels import Amplitude, Probes
+from .surface_fields import SurfaceFields
 
 # Constants of `cells` that the shader of a quad's stiffness needs
 _QUAD_CONSTANTS = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "FADED", "TINY", "PER_TINY")
@@ -316,8 +317,8 @@ class ExtraForces:
             self._fields.run_list(self._irregular, count)
 
 
-class GLBackend(FieldBackend):
-    """Height and velocity in float32 storage buffers."""
+class GLBackend:
+    """Height and velocity in float32 storage buffers; see `Backend`."""
 
     name = "gl"
 
@@ -331,38 +332,64 @@ class GLBackend(FieldBackend):
         self.keeps_volume = keeps_volume
         self._gl = gl if gl is not None else shared_context()
         self._operator = operator
-        self._fields = fields = FieldLayout(self._gl, operator.topology)
+        self._layout = layout = FieldLayout(self._gl, operator.topology)
         self._yield: moderngl.Buffer | None = None
-        self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
-        self._stencil = StencilBuffer(fields, operator.stencil)
-        self._response = fields.upload(operator.response)
+        self.fields = SurfaceFields(
+            layout, operator.topology.shape, h=layout.zeros(), v=layout.zeros()
+        )
+        # room for the height of the next substep
+        self._h_next = layout.zeros()
+        self._stencil = StencilBuffer(layout, operator.stencil)
+        self._response = layout.upload(operator.response)
         # velocity shifts of the kicks, a number for each part where there are several; and the
         # accelerations that the load holds
-        self._part_shifts = None if operator.parts is None else Pressure(fields, operator)
+        self._part_shifts = None if operator.parts is None else Pressure(layout, operator)
         self._held: Pressure | None = None
         self._kicks = TexelList(self._gl)
         self._forces = TexelList(self._gl)
-        self._extra = ExtraForces(fields, operator)
+        self._extra = ExtraForces(layout, operator)
         if operator.yield_height is not None:
-            self._dent = fields.zeros()
-            self._yield = fields.upload(operator.yield_height)
-            self._yielding = fields.texel_shader("flow")
-        self._kick = fields.shader("kick")
-        self._irregular_kick = fields.shader("irregular", KICK=1)
+            self.fields.dent = layout.zeros()
+            self._yield = layout.upload(operator.yield_height)
+            self._yielding = layout.texel_shader("flow")
+        self._kick = layout.shader("kick")
+        self._irregular_kick = layout.shader("irregular", KICK=1)
         drift_defines = {} if self._part_shifts is None else {"PARTS": 1}
-        self._drift = fields.texel_shader("drift", **drift_defines)
+        self._drift = layout.texel_shader("drift", **drift_defines)
         self._shift: Amplitude = 0.0
         self._prepared = (0.0, keeps_volume)
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
-        self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
+        self._load = NO_LOAD
+        # the load whose forces are uploaded
+        self._uploaded: TexelLoad | None = None
+        self._probes: DeviceProbes | None = None
+
+    def velocity(self) -> NDArray[np.float32]:
+        """Copy of the velocity [m/s], with all kicks."""
+        with self._gl:
+            self._start(0.0)
+        return self.fields.velocity()
+
+    def set_velocity(self, velocity: NDArray[np.float32]) -> None:
+        """Replace the velocity [m/s]; earlier kicks are gone."""
+        self.fields.set_velocity(velocity)
+        self._waiting = []
+        self._shift = 0.0
+
+    def crests(self) -> NDArray[np.float32]:
+        """Greatest size of the height since the last call [m]: after any `advance`, or now."""
+        self._raise_crests(self.fields.watched_crests())
+        return self.fields.take_crests()
 
     def snapshot(self) -> NDArray[np.float32] | DeviceField:
         """Copy of the height [m], [C, n, n], on the GPU; with a software driver, on the host."""
         if self._gl.software:
-            return self.height()
-        fields = [self._h] if self._dent is None else [self._h, self._dent]
+            return self.fields.height()
+        fields = [self.fields.h]
+        if self.fields.dent is not None:
+            fields.append(self.fields.dent)
         return DeviceField.gathered(
-            self._gl, self._operator.mass.shape, self._fields.texel_addresses, *fields
+            self._gl, self._operator.mass.shape, self._layout.texel_addresses, *fields
         )
 
     def kick(
@@ -375,20 +402,13 @@ class GLBackend(FieldBackend):
         self._waiting.append((texels, velocities))
         self._shift = self._shift + everywhere
 
-    def load(
-        self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude
-    ) -> None:
-        """Hold forces [N] on some texels, and an acceleration [m/s^2] on all.
-
-        Until the next call.
-        """
-        self._loaded = texels
-        self._load_forces = forces
-        self._acceleration = everywhere
-        self._load_is_new = True
+    def hold(self, load: TexelLoad) -> None:
+        """Let a load act in every substep until the next call."""
+        self._load = load
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
+        fields = self.fields
         with self._gl:
             kick_drift = self._prepare(dt)
             self._start(dt / 2)
@@ -397,36 +417,36 @@ class GLBackend(FieldBackend):
                 self._probes.begin(substeps)
             for step in range(substeps):
                 drift = dt if step < substeps - 1 else dt / 2
-                self._fields.fill_halo(self._h)
-                self._extra.gather(self._h, self._v)
+                self._layout.fill_halo(fields.h)
+                self._extra.gather(fields.h, fields.v)
                 if self._held is not None and self._held.follow is not None:
-                    self._held.follow(self._h, self._v)
+                    self._held.follow(fields.h, fields.v)
                 self._kick_and_drift(kick_drift, drift)
-                self._h, self._h_next = self._h_next, self._h
+                fields.h, self._h_next = self._h_next, fields.h
                 self._kick_texels(self._forces, drift)
                 if self._probes is not None:
-                    self._probes.take(step, drift - dt / 2, self._h, self._v, self._dent)
+                    self._probes.take(step, drift - dt / 2, fields.h, fields.v, fields.dent)
                 self._flow()
-            if self._crests is not None:
-                self._raise_crests()
+            if fields.crests is not None:
+                self._raise_crests(fields.crests)
 
     def _kick_and_drift(self, shader: moderngl.ComputeShader, drift: float) -> None:
         """Kick the velocities by all forces, and let the heights drift for a time [s]."""
-        fields = (self._h, self._v, self._h_next)
+        fields = (self.fields.h, self.fields.v, self._h_next)
         operator = (self._stencil.buffer, self._coefficients, self._extra.field)
         pressure = () if self._held is None else (self._held.parts, self._held.amplitudes)
         shader["dt"] = drift
         bind_buffers(*fields, *operator, *pressure)
-        self._fields.run_texels(shader)
+        self._layout.run_texels(shader)
         link_count, *link_buffers = self._links
         if link_count:
             self._irregular_kick["dt"] = drift
             bind_buffers(*fields, *link_buffers)
-            self._fields.run_list(self._irregular_kick, link_count)
+            self._layout.run_list(self._irregular_kick, link_count)
 
     def probe(self, probes: Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
-        self._probes = probes and DeviceProbes(self._fields, probes)
+        self._probes = probes and DeviceProbes(self._layout, probes)
 
     def probed(self) -> NDArray[np.float32]:
         """The sums of the latest `advance`, [substeps, k]."""
@@ -438,7 +458,7 @@ class GLBackend(FieldBackend):
         self._stencil.write(operator.stencil, operator.mass)
         self._extra.move(operator)
         if self._prepared[0]:
-            self._links = self._fields.upload_links(self._stencil.irregular, self._step.gain)
+            self._links = self._layout.upload_links(self._stencil.irregular, self._step.gain)
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
@@ -457,41 +477,35 @@ class GLBackend(FieldBackend):
             all_velocities = np.concatenate([velocities for _, velocities in self._waiting])
             texels, texel_of_kick = np.unique(all_texels, return_inverse=True)
             kicks = np.bincount(texel_of_kick, all_velocities)
-            self._kicks.set(self._fields.texels[texels], kicks)
+            self._kicks.set(self._layout.texels[texels], kicks)
             self._waiting = []
             self._kick_texels(self._kicks, 0.0)
         if dt or np.any(self._shift):
             self._drift["dt"] = dt
-            fields = (self._h, self._v, self._response)
+            fields = (self.fields.h, self.fields.v, self._response)
             if self._part_shifts is None:
                 self._drift["shift"] = self._shift
                 bind_buffers(*fields)
             else:
                 self._part_shifts.set(self._shift)
                 bind_buffers(*fields, self._part_shifts.parts, self._part_shifts.amplitudes)
-            self._fields.run_texels(self._drift)
+            self._layout.run_texels(self._drift)
         self._shift = 0.0
 
     def _flow(self) -> None:
         """Move the height beyond the yield height into the dent, where the material yields."""
-        if self._dent is not None and self._yield is not None:
-            bind_buffers(self._h, self._dent, self._yield)
-            self._fields.run_texels(self._yielding)
+        if self._yield is not None:
+            bind_buffers(self.fields.h, self.fields.dent, self._yield)
+            self._layout.run_texels(self._yielding)
 
-    def _raise_crests(self) -> None:
+    def _raise_crests(self, crests: moderngl.Buffer) -> None:
+        """Raise the crests to the size of the height where that is greater."""
+        dent = self.fields.dent
         with self._gl:
-            defines = {} if self._dent is None else {"DENT": 1}
-            shader = self._fields.texel_shader("crests", **defines)
-            bind_buffers(self._h, self._crests, self._dent)
-            self._fields.run_texels(shader)
-
-    def _apply_kicks(self) -> None:
-        with self._gl:
-            self._start(0.0)
-
-    def _drop_kicks(self) -> None:
-        self._waiting = []
-        self._shift = 0.0
+            defines = {} if dent is None else {"DENT": 1}
+            shader = self._layout.texel_shader("crests", **defines)
+            bind_buffers(self.fields.h, crests, dent)
+            self._layout.run_texels(shader)
 
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
         """The shader that kicks this material's velocities, for substeps of dt [s].
@@ -503,17 +517,18 @@ class GLBackend(FieldBackend):
             self._prepare_coefficients(dt)
             self._prepared = (dt, self.keeps_volume)
         k = self._step
-        if new_length or self._load_is_new:
-            kicks = k.gain.reshape(-1)[self._loaded] * self._load_forces.astype(np.float32)
-            self._forces.set(self._fields.texels[self._loaded], kicks)
+        load = self._load
+        if new_length or load is not self._uploaded:
+            kicks = k.gain.reshape(-1)[load.texels] * load.forces.astype(np.float32)
+            self._forces.set(self._layout.texels[load.texels], kicks)
             if self._held is not None:
-                self._held.set(self._acceleration)
-            self._load_is_new = False
+                self._held.set(load.acceleration)
+            self._uploaded = load
         used_by_define = {"EXTRA": self._extra.field, "MAPS": self._maps, "PARTS": self._held}
         defines = {name: 1 for name, used in used_by_define.items() if used}
-        kick_drift = self._fields.texel_shader("kick_drift", **defines)
+        kick_drift = self._layout.texel_shader("kick_drift", **defines)
         if self._held is None:
-            kick_drift["acceleration"] = self._acceleration
+            kick_drift["acceleration"] = load.acceleration
         if not self._maps:
             kick_drift["decay"] = k.decay
             kick_drift["spring"] = k.spring
@@ -526,14 +541,14 @@ class GLBackend(FieldBackend):
         uniform_or_maps = (k.decay, k.spring, k.span)
         self._maps = any(np.ndim(value) for value in uniform_or_maps)
         maps = uniform_or_maps if self._maps else ()
-        self._coefficients = self._fields.upload(k.gain, *maps)
-        self._links = self._fields.upload_links(self._stencil.irregular, k.gain)
+        self._coefficients = self._layout.upload(k.gain, *maps)
+        self._links = self._layout.upload_links(self._stencil.irregular, k.gain)
         rate = volume_rate(self._operator, dt, self.keeps_volume)
         several = rate is not None or self._operator.parts is not None
-        self._held = Pressure(self._fields, self._operator, rate) if several else None
+        self._held = Pressure(self._layout, self._operator, rate) if several else None
 
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:
             self._kick["dt"] = dt
-            bind_buffers(self._h, self._v, kicks.places, kicks.values)
-            self._fields.run_list(self._kick, kicks.count)
+            bind_buffers(self.fields.h, self.fields.v, kicks.places, kicks.values)
+            self._layout.run_list(self._kick, kicks.count)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backends.backend import Backend
+from ..backends.backend import Backend, TexelLoad
 from ..errors import SolverError
 from ..operator.volume import VolumeBalance
 
@@ -194,6 +194,7 @@ class HeldLoad:
             raise SolverError(
                 f"the forces of a load must be finite, got forces that add up to {total!r} N"
             )
-        self._backend.load(once.texels, forces, self.counterpart(once.texels, forces))
+        acceleration = self.counterpart(once.texels, forces)
+        self._backend.hold(TexelLoad(once.texels, forces, acceleration))
         self._uploaded = load
         return total

@@ -103,7 +103,8 @@ class Listeners:
             listener.take(time, dt, sums[:, begin:end])
 
     def _begin(self, listener: Listener, time: float) -> None:
-        listener.begin(time, listener.probes.of(self._backend.height(), self._backend.velocity()))
+        height = self._backend.fields.height()
+        listener.begin(time, listener.probes.of(height, self._backend.velocity()))
 
 
 class Samples(NamedTuple):

@@ -198,7 +198,7 @@ class WaveSolver:
         self.time += dt
         self.substeps_taken += substeps
         if self._guard.due(substeps) and not self._backend.finite():
-            self._finite(self._backend.height(), "height")
+            self._finite(self._backend.fields.height(), "height")
 
     def reset(self) -> None:
         """Flatten the surface, end all pressure, and set the time back to 0."""
@@ -373,8 +373,8 @@ class WaveSolver:
         field = as_field(height, "height", self.operator.mass.shape).astype(np.float64)
         field = self._balance.balanced_height(field * self.operator.free, self._areas)
         self._note("height", field)
-        elastic = self._backend.elastic() + field.astype(np.float32)
-        self._backend.set_height(elastic, self._backend.dent())
+        elastic = self._backend.fields.elastic_height() + field.astype(np.float32)
+        self._backend.fields.set_height(elastic, self._backend.fields.permanent_height())
 
     def add_velocity(self, velocity: ArrayLike) -> None:
         """Add a field [m/s], [C, n, n], to the velocity.
@@ -396,13 +396,13 @@ class WaveSolver:
 
         Reading raises `SolverError` once if a height is no longer finite.
         """
-        return self._finite(self._backend.height(), "height")
+        return self._finite(self._backend.fields.height(), "height")
 
     @height.setter
     def height(self, value: ArrayLike) -> None:
         height = as_field(value, "height", self.operator.mass.shape) * self.operator.free
         self._note("height", height)
-        self._backend.set_height(height)
+        self._backend.fields.set_height(height)
 
     def crests(self) -> NDArray[np.float32]:
         """Greatest size of each height since the last call [m], [C, n, n].
@@ -423,7 +423,7 @@ class WaveSolver:
     @property
     def dent(self) -> NDArray[np.float32]:
         """Permanent part of the height [m], float32 [C, n, n]; 0 unless the material yields."""
-        return self._finite(self._backend.dent(), "dent")
+        return self._finite(self._backend.fields.permanent_height(), "dent")
 
     @property
     def velocity(self) -> NDArray[np.float32]:
@@ -448,7 +448,7 @@ class WaveSolver:
         substep stays the same. It differs from the continuous energy by O(dt^2). Energy spent on
         dents is not included.
         """
-        elastic = self._finite(self._backend.elastic(), "height")
+        elastic = self._finite(self._backend.fields.elastic_height(), "height")
         height = elastic.astype(np.float64)
         velocity = self.velocity.astype(np.float64)
         with np.errstate(invalid="ignore"):  # NaN says enough
@@ -488,7 +488,7 @@ class WaveSolver:
         resolution. Where the solver's own material clamps the surface or carries no waves, only
         dents are taken over, and the surface is at rest.
         """
-        elastic = self._finite(self._backend.elastic(), "height")
+        elastic = self._finite(self._backend.fields.elastic_height(), "height")
         clock = self.time, self._substep, self.substeps_taken
         return WaveState(elastic, self.dent, self.velocity, self._held.load, *clock)
 
@@ -499,7 +499,7 @@ class WaveSolver:
             raise SolverError(
                 f"the state of waves has shape {state.elastic.shape}; valid is {shape}"
             )
-        self._backend.set_height(state.elastic * self.operator.free, state.dent)
+        self._backend.fields.set_height(state.elastic * self.operator.free, state.dent)
         self._backend.set_velocity(state.velocity * self.operator.movable)
         self._held.load = state.held
         self.time = state.time

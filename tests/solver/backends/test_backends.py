@@ -95,10 +95,10 @@ def test_gl_equals_cpu_at_any_resolution(gl_backend: str, resolution: int) -> No
 
     def run(name: str) -> np.ndarray:
         backend = make_backend(name, operator)
-        backend.set_height(height)
-        np.testing.assert_array_equal(backend.height(), height)
+        backend.fields.set_height(height)
+        np.testing.assert_array_equal(backend.fields.height(), height)
         backend.advance(10, 0.5 / resolution)
-        return backend.height()
+        return backend.fields.height()
 
     cpu = run("cpu")
     assert np.abs(cpu - height).max() > 0.1
@@ -241,5 +241,6 @@ def test_a_new_backend_is_at_rest_and_stays_there(operator: WaveOperator, backen
     waves.advance(3, 0.01)
     waves.wait()
     assert waves.finite()
-    for field in (waves.height(), waves.velocity(), waves.dent()):
+    fields = waves.fields
+    for field in (fields.height(), waves.velocity(), fields.permanent_height()):
         assert field.dtype == np.float32 and field.shape == (1, 4, 4) and not field.any()

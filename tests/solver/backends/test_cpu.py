@@ -7,7 +7,7 @@ import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Material, TexelMesh, texel_atlas
-from ripple_sim.solver.backends import CPUBackend, advance
+from ripple_sim.solver.backends import CPUBackend, TexelLoad, advance
 from ripple_sim.solver.backends.kernels import Probes
 from ripple_sim.solver.operator import WaveOperator, build_operator
 from ripple_sim.solver.texels import stiffness_matrix
@@ -98,7 +98,7 @@ def noise(texels: TexelMesh, seed: int) -> np.ndarray:
 
 def started(operator: WaveOperator, height: np.ndarray, velocity: np.ndarray) -> CPUBackend:
     backend = CPUBackend(operator)
-    backend.set_height(height)
+    backend.fields.set_height(height)
     backend.set_velocity(velocity)
     return backend
 
@@ -120,13 +120,15 @@ def test_waves_are_those_of_whole_matrices(mesh: str, material: str, substeps: i
     loaded = np.unique([0, texels.areas.size // 2])
     dense.forces[loaded] = 0.3
     dense.acceleration = -0.7
-    backend.load(loaded, np.full(len(loaded), 0.3), -0.7)
+    backend.hold(TexelLoad(loaded, np.full(len(loaded), 0.3), -0.7))
     for _ in range(2):
         for waves in (dense, backend):
             waves.advance(substeps, step_of(operator))
     expected = [(dense.h + dense.dent), dense.v, dense.dent]
     for now, then in zip(
-        (backend.height(), backend.velocity(), backend.dent()), expected, strict=True
+        (backend.fields.height(), backend.velocity(), backend.fields.permanent_height()),
+        expected,
+        strict=True,
     ):
         np.testing.assert_allclose(now.ravel(), then, atol=2e-5 * max(1.0, np.abs(then).max()))
 
@@ -155,10 +157,10 @@ def test_waves_without_damping_run_back_to_where_they_came_from() -> None:
     backend = started(operator, height, velocity)
     dt = step_of(operator)
     backend.advance(50, dt)
-    assert np.abs(backend.height() - height).max() > 0.5
+    assert np.abs(backend.fields.height() - height).max() > 0.5
     backend.set_velocity(-backend.velocity())
     backend.advance(50, dt)
-    np.testing.assert_allclose(backend.height(), height, atol=2e-4)
+    np.testing.assert_allclose(backend.fields.height(), height, atol=2e-4)
     np.testing.assert_allclose(backend.velocity(), -velocity, atol=2e-3)
 
 
@@ -176,11 +178,17 @@ def test_reading_shows_copies_and_changes_nothing(material: str) -> None:
     operator = operator_of(texels, MATERIALS[material](texels))
     backend = started(operator, 0.1 * noise(texels, 1), noise(texels, 2))
     backend.kick(np.array([0]), np.array([1.0], np.float32), 0.5)
-    before = [backend.height().copy(), backend.velocity().copy(), backend.dent().copy()]
-    for read in (backend.height, backend.velocity, backend.dent):
+    before = [
+        backend.fields.height().copy(),
+        backend.velocity().copy(),
+        backend.fields.permanent_height().copy(),
+    ]
+    for read in (backend.fields.height, backend.velocity, backend.fields.permanent_height):
         read()[:] = np.nan
     for now, then in zip(
-        [backend.height(), backend.velocity(), backend.dent()], before, strict=True
+        [backend.fields.height(), backend.velocity(), backend.fields.permanent_height()],
+        before,
+        strict=True,
     ):
         np.testing.assert_array_equal(now, then)
 
@@ -193,10 +201,10 @@ def test_one_height_that_is_no_number_is_noticed(
     texels = MESHES["corner of five"]
     backend = CPUBackend(operator_of(texels, Material(speed=1.0)))
     height = noise(texels, 1)
-    backend.set_height(height)
+    backend.fields.set_height(height)
     assert backend.finite()
     height[texel] = poison
-    backend.set_height(height)
+    backend.fields.set_height(height)
     assert not backend.finite()
 
 
@@ -214,14 +222,17 @@ def test_any_number_of_threads_gives_the_same_bits(mesh: str, material: str) -> 
     results = []
     for threads in (1, 2, 3, 8):
         backend = CPUBackend(operator, threads=threads)
-        backend.set_height(noise(texels, 1) * operator.free)
+        backend.fields.set_height(noise(texels, 1) * operator.free)
         backend.set_velocity(noise(texels, 2) * operator.free)
-        backend.load(np.array([0, texels.areas.size - 1]), np.array([0.3, -0.2]), -0.7)
+        loaded = np.array([0, texels.areas.size - 1])
+        backend.hold(TexelLoad(loaded, np.array([0.3, -0.2]), -0.7))
         backend.probe(probes)
         backend.advance(7, step_of(operator))
         backend.probe(None)
         backend.advance(4, step_of(operator))
-        results.append([backend.height(), backend.velocity(), backend.dent(), backend.probed()])
+        fields = backend.fields
+        heights = [fields.height(), fields.permanent_height()]
+        results.append([*heights, backend.velocity(), backend.probed()])
     for result in results[1:]:
         for values, expected in zip(result, results[0], strict=True):
             np.testing.assert_array_equal(values, expected)

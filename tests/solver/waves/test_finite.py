@@ -54,7 +54,7 @@ def test_what_is_not_finite_is_reported_with_place_and_time(backend: str) -> Non
     waves.step(0.5)
     height = np.zeros((6, 16, 16), np.float32)
     height[2, 5, 9] = np.nan
-    waves._backend.set_height(height)
+    waves._backend.fields.set_height(height)
     place = atlas.positions[2, 5, 9]
     expected = (
         rf"chart 2, row 5, column 9, \({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}\) m "
@@ -107,7 +107,7 @@ def test_nothing_that_is_not_finite_leaves_the_solver_without_an_error(
     name: str, backend: str
 ) -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend=backend)
-    waves._backend.set_height(np.full((6, 8, 8), np.nan, np.float32))
+    waves._backend.fields.set_height(np.full((6, 8, 8), np.nan, np.float32))
     waves._backend.set_velocity(np.full((6, 8, 8), np.nan, np.float32))
     with pytest.raises(SolverError, match=r"no longer finite .* no source was given"):
         READ[name](waves)
