@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SolverError, shown, warn_caller
 from ..kernel import Floats, Floats32, Ints, kernel
-from ..mesh.mesh import Mesh
+from ..mesh.moved_mesh import MovedMesh
 from ..mesh.topology import Folds, edges_of
 from ..operator.material import Material
 from ..operator.moving_operator import MovingOperator
@@ -25,9 +23,6 @@ _SQUARED_LENGTH_TOLERANCE = 2e-3
 
 # Folds are counted once in this many computations of the stiffness: both take about as long.
 _FOLD_CHECK_INTERVAL = 8
-
-# Cached properties of a mesh that do not change when its vertices move.
-_UNCHANGED_PROPERTIES = ("components", "rims", "genus")
 
 # Least area of a texel's moved parallelogram, as a share of the product of its squared sides: beside
 # a flat one gradients stay finite.
@@ -60,6 +55,9 @@ class Motion:
         self._edges = edges_of(self._folds.F).ends
         self._squares, _ = _square_lengths(self.V, self._edges, np.zeros(len(self._edges)))
         self._now = operator
+        # the atlas and the areas where the vertices are now; None until somebody asks for them
+        self._atlas: Atlas | None = None
+        self._areas: NDArray[np.float64] | None = None
         self._warned = False
         self._looks = 0
 
@@ -70,13 +68,13 @@ class Motion:
         not finite, or have another shape than the vertices of the mesh.
         """
         self.V = self._checked(vertices)
-        self.__dict__.pop("atlas", None)
+        self._atlas = None
         squares, changed = _square_lengths(self.V, self._edges, self._squares)
         if not changed:
             return None
         self._squares = squares  # another array: copies have the one before
         self._now = self._operator.at(MovedPlaces(self._ride, self.V))
-        self.__dict__.pop("areas", None)
+        self._areas = None
         self._looks += 1
         if self._warned or self._looks % _FOLD_CHECK_INTERVAL != 1:
             return self._now
@@ -85,33 +83,37 @@ class Motion:
             self._warned = True
             warn_caller(
                 f"{count} of {len(self._folds.F)} triangles of the moving surface are turned over "
-                f"or without area; "
-                "waves there are wrong: move the vertices less, or use a stiffer body"
+                "or without area; waves there are wrong: move the vertices less, or use a stiffer body"
             )
         return self._now
 
-    @functools.cached_property
+    @property
     def areas(self) -> NDArray[np.float64]:
         """Area of each texel [m^2], [C, n, n]."""
-        return self._operator.areas(self._now.stencil)
+        if self._areas is None:
+            self._areas = self._operator.areas(self._now.stencil)
+        return self._areas
 
-    @functools.cached_property
+    @property
     def atlas(self) -> Atlas:
         """The atlas where the vertices are."""
+        if self._atlas is None:
+            self._atlas = self._moved_atlas()
+        return self._atlas
+
+    def _moved_atlas(self) -> Atlas:
         rest = self.rest
-        V = self.V
-        mesh = Mesh(
-            V, rest.mesh.F, rest.mesh.uv, rest.mesh.corner_uv, rest.mesh.notes, rest.mesh.name
-        )
-        for name in _UNCHANGED_PROPERTIES:
-            if name in rest.mesh.__dict__:
-                mesh.__dict__[name] = rest.mesh.__dict__[name]
-        mesh.__dict__["vertex_normals"] = self._folds.vertex_normals(V)
-        positions, beyond = self._ride.positions(V)
-        normals = self._ride.normals(mesh.vertex_normals)
+        vertex_normals = self._folds.vertex_normals(self.V)
+        positions, beyond = self._ride.positions(self.V)
         texels = TexelMesh(
-            rest.texels.topology, positions, normals, self.areas, beyond, rest.texels.detours
+            topology=rest.texels.topology,
+            positions=positions,
+            normals=self._ride.normals(vertex_normals),
+            areas=self.areas,
+            beyond=beyond,
+            detours=rest.texels.detours,
         )
+        mesh = MovedMesh.of(rest.mesh, self.V, vertex_normals)
         return Atlas(mesh, texels, rest.chart_map, rest.triangles, rest.barycentrics)
 
     def _checked(self, vertices: ArrayLike) -> NDArray[np.float64]:
