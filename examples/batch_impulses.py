@@ -53,7 +53,7 @@ heights = true
 
 
 def touches(folder: Path) -> np.ndarray:
-    """Each touch of each scene, from first to last contact: place [m], impulse [N s], highest ripple meanwhile [m]."""
+    """The touches of each scene: place [m], impulse [N s] and highest ripple meanwhile [m]."""
     found = []
     for scene in load_batch(folder):
         highest = np.abs(scene.heights()["egg"]).max(axis=(1, 2, 3))

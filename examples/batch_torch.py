@@ -20,9 +20,10 @@ from ripple_sim import load_batch
 
 
 class Scenes:
-    """One scene at a time: frames [frames, height, width, 3], heights [frames, C, n, n], impulse [frames] in N s.
+    """Arrays of one scene after another, and the impulse of each frame [N s].
 
-    A `DataLoader` takes whatever has these three methods, and makes tensors of the arrays.
+    The arrays are frames [frames, height, width, 3] and heights [frames, C, n, n]. A `DataLoader`
+    accepts any object with these three methods, and converts the arrays to tensors.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -41,7 +42,10 @@ class Scenes:
 
 
 def label(sample: dict[str, bytes]) -> tuple[int, float, int]:
-    """Number, impulse and length of the positions of a sample of webdataset, whose keys are ends of names."""
+    """Number, impulse and length of each position in a sample of webdataset.
+
+    The keys of a sample are the ends of file names.
+    """
     facts = json.loads(sample["scene.json"])
     return facts["number"], facts["impulse"], len(np.load(io.BytesIO(sample["qpos.npy"])))
 

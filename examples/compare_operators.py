@@ -1,4 +1,4 @@
-"""The four wave operators side by side: the same bump on the same sphere, and tables of their errors.
+"""The four wave operators side by side: the same bump on the same sphere, and errors.
 
     python examples/compare_operators.py
 
@@ -34,7 +34,7 @@ FULL = 0.2
 
 
 def crest_angle() -> float:
-    """How far the crest has come by TIME [rad]: as on the plane, from which a sphere differs little so near."""
+    """Distance of the crest at TIME [rad], as on a plane: a sphere differs little so near."""
     angle = np.linspace(5 * WIDTH, 2 * TIME, 200)
     return float(np.interp(TIME, plane_arrival(angle / WIDTH)[1] * WIDTH, angle))
 

@@ -1,4 +1,4 @@
-"""Which of four places on a board was tapped? Four accelerometers at its corners, and a least-squares classifier.
+"""Find which of four places on a board was tapped, from four accelerometers.
 
     pip install 'ripple-sim[gymnasium]'
     python examples/gymnasium_tapped_place.py
@@ -24,7 +24,8 @@ CORNERS = [(x, y, 0.01) for x in (-0.19, 0.19) for y in (-0.14, 0.14)]
 SENSORS = {"corners": {"geom": "board", "at": CORNERS, "rate": 4000}}
 BOARD = """<mujoco><option timestep="0.001"/><worldbody>
 <geom name="board" type="box" size="0.2 0.15 0.01" solref="0.002 0.3"/>
-<body pos="0 0 0.05"><freejoint/><geom size="0.012" mass="0.01" solref="0.002 0.3"/></body></worldbody></mujoco>"""
+<body pos="0 0 0.05"><freejoint/><geom size="0.012" mass="0.01" solref="0.002 0.3"/></body>
+</worldbody></mujoco>"""
 
 
 class Taps(MujocoEnv):

@@ -14,7 +14,8 @@ MODEL = """<mujoco>
   <worldbody>
     <light pos="1 -1 3" dir="-1 1 -3"/>
     <geom name="floor" type="plane" size="2 2 0.1" rgba="0.8 0.84 0.87 1"/>
-    <body pos="0 0 0.3"><geom name="egg" type="ellipsoid" size="0.42 0.3 0.3" rgba="0.93 0.6 0.35 1"/></body>
+    <body pos="0 0 0.3">
+    <geom name="egg" type="ellipsoid" size="0.42 0.3 0.3" rgba="0.93 0.6 0.35 1"/></body>
     <body pos="0.08 -0.05 0.9"><freejoint/>
       <geom size="0.07" density="350" rgba="0.15 0.3 0.5 1" solref="0.005 0.3"/></body>
   </worldbody>

@@ -1,4 +1,4 @@
-"""A robot's arm as models of robots have it: smooth covers that are seen, and capsules inside them that collide.
+"""A robot's arm as in robot models: smooth covers to see, and capsules that collide.
 
     python examples/robot_arm.py
 
@@ -22,7 +22,8 @@ MODEL = """<mujoco model="arm">
     <joint axis="0 1 0" damping="4" armature="0.05"/>
     <position kp="400" kv="40"/>
     <geom solref="0.008 0.5" condim="4"/>
-    <default class="visual"><geom type="mesh" contype="0" conaffinity="0" group="2" mass="0"/></default>
+    <default class="visual"><geom type="mesh" contype="0" conaffinity="0" group="2" mass="0"/>
+    </default>
     <default class="collision"><geom type="capsule" group="3" density="400"/></default>
   </default>
   <worldbody>
@@ -40,10 +41,13 @@ MODEL = """<mujoco model="arm">
         <geom class="collision" type="sphere" size="0.1" pos="0 0 0.52"/>
       </body>
     </body>
-    <body pos="0.19 0.01 0.87"><freejoint/><geom name="blue" size="0.05" density="400" rgba="0.2 0.35 0.6 1"/></body>
-    <body pos="0.36 -0.01 0.98"><freejoint/><geom name="green" size="0.05" density="350" rgba="0.25 0.5 0.4 1"/></body>
+    <body pos="0.19 0.01 0.87"><freejoint/>
+    <geom name="blue" size="0.05" density="400" rgba="0.2 0.35 0.6 1"/></body>
+    <body pos="0.36 -0.01 0.98"><freejoint/>
+    <geom name="green" size="0.05" density="350" rgba="0.25 0.5 0.4 1"/></body>
   </worldbody>
-  <actuator><position name="shoulder" joint="shoulder"/><position name="elbow" joint="elbow"/></actuator>
+  <actuator><position name="shoulder" joint="shoulder"/><position name="elbow" joint="elbow"/>
+  </actuator>
 </mujoco>"""
 COVERS = {
     "upper": (

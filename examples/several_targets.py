@@ -20,7 +20,8 @@ MODEL = """<mujoco>
     <geom name="floor" type="plane" size="0 0 1" rgba="0.9 0.88 0.84 1"/>
     <body pos="-0.3 0 0.25"><freejoint/><geom name="red" size="0.25" rgba="0.85 0.35 0.3 1"/></body>
     <body pos="0.3 0 0.25"><freejoint/><geom name="blue" size="0.25" rgba="0.25 0.5 0.62 1"/></body>
-    <body pos="0.05 0.08 0.95"><freejoint/><geom name="yellow" size="0.2" rgba="0.93 0.75 0.35 1"/></body>
+    <body pos="0.05 0.08 0.95"><freejoint/><geom name="yellow" size="0.2" rgba="0.93 0.75 0.35 1"/>
+    </body>
   </worldbody>
 </mujoco>"""
 TIMES = (0.3, 0.42, 0.55)

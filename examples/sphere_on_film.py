@@ -42,18 +42,21 @@ def film_mesh(rings: int = 24) -> tuple[np.ndarray, np.ndarray]:
 
 
 def film_model() -> mujoco.MjModel:
-    """A film that is only visible, a plate in its plane that collides for it, and the sphere above."""
+    """A film that is only visible, a plate that collides for it, and the sphere above."""
     V, F = film_mesh()
     numbers = {
         name: " ".join(map(str, values.ravel())) for name, values in (("vertex", V), ("face", F))
     }
     return mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{STEP}"/>
-        <asset><mesh name="film" inertia="shell" vertex="{numbers["vertex"]}" face="{numbers["face"]}"/></asset>
+        <asset>
+        <mesh name="film" inertia="shell" vertex="{numbers["vertex"]}" face="{numbers["face"]}"/>
+        </asset>
         <default><geom solref="{2 * STEP} 1" friction="0 0 0" condim="1"/></default><worldbody>
         <geom name="film" type="mesh" mesh="film" contype="0" conaffinity="0"/>
         <geom name="plate" type="cylinder" size="{FILM} 0.005" pos="0 0 -0.005"/>
-        <body pos="0 0 {RADIUS}"><freejoint/><geom name="sphere" size="{RADIUS}" mass="{MASS}"/></body>
+        <body pos="0 0 {RADIUS}"><freejoint/><geom name="sphere" size="{RADIUS}" mass="{MASS}"/>
+        </body>
         </worldbody></mujoco>"""
     )
 

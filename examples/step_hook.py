@@ -1,4 +1,4 @@
-"""A Python function that is called before every physics step: here it stirs a sphere with an invisible finger.
+"""A Python function that is called before every physics step stirs a sphere.
 
 Makes out/step_hook.mp4. The function gets the running `Simulation`: MuJoCo's model and data, to
 steer actuators or move mocap bodies, and the ripples, to press on surfaces.

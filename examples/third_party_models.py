@@ -40,7 +40,7 @@ TOLD = {
 
 
 class Case(NamedTuple):
-    """A model, what ripples there, where the ball comes from, and groups of geoms that are not drawn."""
+    """A model, its targets, where the ball comes from, and groups of geoms not drawn."""
 
     package: str
     path: str
@@ -172,7 +172,7 @@ def shortly(message: str) -> str:
 
 
 def tried(case: Case, file: Path, picture: Path) -> str:
-    """A row of the table: with the material that the model chooses, or where that is too heavy, suited to the ball."""
+    """A row of the table: the model's default material, or one suited to the ball."""
     spec = mujoco.MjSpec.from_file(str(file))
     middle, half = box_of(spec.compile(), case.geom)
     with_ball(spec, middle, half, np.array(case.side))

@@ -55,8 +55,8 @@ _TURN_SECONDS = 0.04
 # velocity and the next height.
 FIELDS = ("east", "north", "northeast", "northwest", "gain", "height", "velocity", "next height")
 
-# Floats in a page of memory. Processors take a store and a load at the same place of two pages for a
-# conflict, so each field begins at another place of its page, as in the solver.
+# Floats in a page of memory. Processors take a store and a load at the same place of two pages for
+# a conflict, so each field begins at another place of its page, as in the solver.
 _PAGE_FLOATS = 1024
 
 # Texels of a slice. The compiler vectorises loops over short slices, as in the solver's kernel.

@@ -83,7 +83,7 @@ def _render_flag(flag: Any) -> int:
     if number is None:
         names = [name for name in mujoco.mjtRndFlag.__members__ if name.startswith("mjRND_")]
         valid = ", ".join(repr(name.removeprefix("mjRND_").lower()) for name in names)
-        raise RenderError(f"render flag {flag!r} is unknown; valid are {valid}")
+        raise RenderError(f"render flag must be one of {valid}, got {flag!r}")
     return int(number)
 
 
@@ -128,7 +128,9 @@ def _follow(physics: Any, ripples: Ripples, **looks: Any) -> None:
         scene_callback: Callable[[Any, mujoco.MjvScene], None] | None = None,
     ) -> NDArray:
         if depth and segmentation:
-            raise RenderError("both depth and segmentation are True; valid is one of them")
+            raise RenderError(
+                "depth and segmentation must not both be True: render them one after the other"
+            )
         if depth or segmentation:
             _refuse_with_surfaces(overlays=overlays, render_flag_overrides=render_flag_overrides)
         renderer = renderer_of(height, width)

@@ -3,9 +3,17 @@
 from ripple_sim.solver.errors import RippleError, RippleWarning
 
 __all__ = [
-    "BatchError", "DisplayError", "EncodingError", "ExportError", "RenderError", "RippleError", "RippleWarning",
-    "SceneError", "SimulationError", "VideoError",
-]  # fmt: skip
+    "BatchError",
+    "DisplayError",
+    "EncodingError",
+    "ExportError",
+    "RenderError",
+    "RippleError",
+    "RippleWarning",
+    "SceneError",
+    "SimulationError",
+    "VideoError",
+]
 
 
 class BatchError(RippleError):

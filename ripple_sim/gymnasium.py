@@ -42,8 +42,8 @@ def model_and_data(env: Any) -> tuple[mujoco.MjModel, mujoco.MjData]:
     holder = getattr(env, "physics", env)
     if not (hasattr(holder, "model") and hasattr(holder, "data")):
         raise SceneError(
-            f"the environment {env} has no `model` and `data`; valid are MuJoCo environments, such "
-            "as those derived from gymnasium.envs.mujoco.MujocoEnv"
+            f"the environment {env} has no `model` and `data`: it must be a MuJoCo environment, "
+            "such as one derived from gymnasium.envs.mujoco.MujocoEnv"
         )
     model = own_model(holder.model)
     return model, own_data(model, holder.data)
@@ -177,8 +177,9 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             count = sensor.rate * control
             if name in spaces or round(count) < 1 or abs(count - round(count)) > 1e-6 * count:
                 raise SceneError(
-                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s; "
-                    f"valid are whole numbers, and names other than {', '.join(map(repr, spaces))}"
+                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s: "
+                    "this must be a whole number, and the name none of "
+                    f"{', '.join(map(repr, spaces))}"
                 )
             shape = round(count), len(sensor.points)
             self._counts[name] = shape[0]

@@ -126,8 +126,9 @@ class Simulation:
         steps = 1 / (fps * timestep)
         if not steps < _MAX_STEPS_PER_FRAME:
             raise SceneError(
-                f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are "
-                f"at most {_MAX_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
+                f"the model's timestep must give at most {_MAX_STEPS_PER_FRAME} steps per "
+                f"frame, got {timestep:g} s, which are {steps:.3g}: use a longer timestep in "
+                "the MJCF's <option>"
             )
         self.steps_per_frame = max(1, math.ceil(steps - 1e-9))
         self.model.opt.timestep = 1 / (fps * self.steps_per_frame)

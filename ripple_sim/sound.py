@@ -95,9 +95,9 @@ class Microphone:
             if highest < _LOWEST_AUDIBLE:
                 ringing = 200 * size / 0.77 * slow_motion
                 warn_caller(
-                    f"{name!r} is hardly heard: waves of {size / _SIZE_OVER_WAVELENGTH:.2g} m and longer sound "
-                    f"at {highest:.2g} Hz at most, below hearing ({_LOWEST_AUDIBLE:g} Hz); a speed of "
-                    f"{ringing:.2g} m/s would ring at 200 Hz"
+                    f"{name!r} is hardly heard: waves of {size / _SIZE_OVER_WAVELENGTH:.2g} m and "
+                    f"longer sound at {highest:.2g} Hz at most, below hearing "
+                    f"({_LOWEST_AUDIBLE:g} Hz); a speed of {ringing:.2g} m/s would ring at 200 Hz"
                 )
 
     def place(self, data: mujoco.MjData, point: NDArray[np.float64]) -> None:
@@ -219,7 +219,9 @@ class Ear:
             each = np.ascontiguousarray(changes.T)
             for delay, change in zip((first + self._delays).tolist(), each, strict=True):
                 self._series[delay : delay + len(change)] += change
-        else:  # substeps have another length since the material changed: a change lies between two entries
+        else:
+            # the material changed, and with it the length of a substep: a change of pressure
+            # lies between two entries
             whole = np.maximum(np.floor(when), 0).astype(np.int64)
             late = (when - whole)[:, None]
             places = whole[:, None] + self._delays

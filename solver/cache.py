@@ -105,7 +105,7 @@ def cache_limit() -> int:
             raise ValueError
     except ValueError:
         raise RippleError(
-            f"{LIMIT} is {text!r}; valid is a number of megabytes, 0 or more"
+            f"{LIMIT} must be a number of megabytes, 0 or more, got {text!r}"
         ) from None
     return int(limit * _MEGABYTE)
 

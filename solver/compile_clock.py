@@ -25,8 +25,9 @@ _log = logging.getLogger("ripple_sim")
 class _CompileListener(event.Listener):
     """Seconds of compilation, by module and by thread.
 
-    A kernel that is compiled for another kernel is part of the other kernel's time. Python's garbage
-    collector is off meanwhile: it would go through all that numba makes, a sixth of the time.
+    A kernel that is compiled for another kernel is part of the other kernel's time. Python's
+    garbage collector is off meanwhile: it would go through all that numba makes, a sixth of the
+    time.
     """
 
     def __init__(self) -> None:

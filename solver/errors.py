@@ -23,8 +23,8 @@ import msgspec
 
 _MAX_SHOWN_CHARACTERS = 120  # of a value in a message
 
-# Packages whose frames are not the user's: this package, and packages that run its context managers,
-# threads and processes.
+# Packages whose frames are not the user's: this package, and packages that run its context
+# managers, threads and processes.
 _INTERNAL_PACKAGES = ("ripple_sim", "contextlib", "threading", "concurrent", "multiprocessing")
 
 # File and line that a warning names where no line of the user is known.
@@ -34,7 +34,7 @@ _NO_LINE = ("ripple_sim", 0)
 class RippleError(Exception):
     """Root of all errors that ripple-sim raises on purpose.
 
-    The message says what was wrong, the value, what is valid, and what to do.
+    The message says what was wrong, what is expected, the value, and what to do.
     """
 
 
@@ -74,7 +74,7 @@ _shown_warnings: dict[Any, Any] = {}
 
 @dataclasses.dataclass(frozen=True)
 class Valid:
-    """A condition on an argument, and the words for it: "valid is ..."."""
+    """A condition on an argument, and the words for it: "must be ..."."""
 
     holds: Callable[[Any], bool]
     words: str
@@ -130,10 +130,10 @@ def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:
             msgspec.convert(value, hint)
         except msgspec.ValidationError:
             raise error(
-                f"{name.replace('_', ' ')} is {shown(value)}; valid is {_words(hint)}"
+                f"{name.replace('_', ' ')} must be {_words(hint)}, got {shown(value)}"
             ) from None
         if name in valid and value is not None and not valid[name].holds(value):
-            raise error(f"{name.replace('_', ' ')} is {shown(value)}; valid is {valid[name].words}")
+            raise error(f"{name.replace('_', ' ')} must be {valid[name].words}, got {shown(value)}")
 
 
 def _words(hint: Any) -> str:
@@ -210,8 +210,8 @@ def checked(
 ) -> Callable[[Callable[Parameters, Result]], Callable[Parameters, Result]]:
     """Decorate a function so that arguments are checked before it runs.
 
-    `valid` has conditions by the name of the argument. An argument that is not valid raises `error`.
-    A wrong number of arguments, or a wrong name, is Python's TypeError.
+    `valid` has conditions by the name of the argument. An argument that is not valid raises
+    `error`. A wrong number of arguments, or a wrong name, is Python's TypeError.
     """
 
     def decorate(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
@@ -223,8 +223,8 @@ def checked(
             for name, condition in valid.items():
                 if name in arguments and not condition.holds(arguments[name]):
                     raise error(
-                        f"{name.replace('_', ' ')} is {shown(arguments[name])}; "
-                        f"valid is {condition.words}"
+                        f"{name.replace('_', ' ')} must be {condition.words}, got "
+                        f"{shown(arguments[name])}"
                     )
             return function(*args, **kwargs)
 

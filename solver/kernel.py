@@ -34,11 +34,12 @@ Ints: TypeAlias = NDArray[np.int64]
 Ints32: TypeAlias = NDArray[np.int32]
 Bools: TypeAlias = NDArray[np.bool_]
 
-# Options of `numba.njit` for all kernels. Nobody calls kernels through pointers: without the wrappers
-# for such calls a tenth less is compiled.
+# Options of `numba.njit` for all kernels. Nobody calls kernels through pointers: without the
+# wrappers for such calls a tenth less is compiled.
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
-# Declares a function, written for numbers and arrays alike, that both kernels and plain Python call.
+# Declares a function, written for numbers and arrays alike, that both kernels and plain Python
+# call.
 shared = register_jitable
 
 
@@ -46,9 +47,9 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     """Compile a function at its first call: `@kernel`, or `@kernel(inline="always")`.
 
     The options are those of `numba.njit`. A kernel cannot call itself. A kernel that only kernels
-    call and that takes many arrays compiles quicker with `no_cpython_wrapper=True`: without the code
-    that unpacks Python's arguments. With the environment variable NUMBA_DISABLE_JIT=1 kernels are
-    plain Python, for a debugger.
+    call and that takes many arrays compiles quicker with `no_cpython_wrapper=True`: without the
+    code that unpacks Python's arguments. With the environment variable NUMBA_DISABLE_JIT=1 kernels
+    are plain Python, for a debugger.
     """
     if function is None:
         return functools.partial(kernel, **options)

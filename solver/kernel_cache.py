@@ -1,8 +1,8 @@
 """Compiled kernels on disk, and every other use of numba's private interface.
 
-numba's own cache trusts whatever its files hold. Here each file has a checksum, and a fingerprint of
-the kernel's module and of all modules of the project that this module imports. A kernel whose file
-is damaged, or older than a source, is compiled again. Kernels that were compiled under other
+numba's own cache trusts whatever its files hold. Here each file has a checksum, and a fingerprint
+of the kernel's module and of all modules of the project that this module imports. A kernel whose
+file is damaged, or older than a source, is compiled again. Kernels that were compiled under other
 settings of numba, such as NUMBA_BOUNDSCHECK, have files of their own.
 
 The private parts of numba that are used, for which `pyproject.toml` limits numba's version:

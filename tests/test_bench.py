@@ -1,4 +1,4 @@
-"""The benchmark: its accuracy is that of the theory, its races are fair, its coupling has bodies that touch."""
+"""The benchmark: accuracy as in theory, fair races, and bodies that touch."""
 
 import functools
 import itertools

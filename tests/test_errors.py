@@ -42,8 +42,8 @@ def test_there_is_one_root_for_the_solver_and_the_application() -> None:
 def test_every_error_is_caught_as_a_ripple_error_and_keeps_its_message(
     error: type[RippleError],
 ) -> None:
-    with pytest.raises(RippleError, match=r"^height is nan; valid are numbers$"):
-        raise error("height is nan; valid are numbers")
+    with pytest.raises(RippleError, match=r"^height must be a number, got nan$"):
+        raise error("height must be a number, got nan")
     # a mistake in the code itself must not look like one of the user; two are also what
     # mujoco.Renderer raises
     others = {

@@ -20,7 +20,12 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 from ripple_sim import Material, RippleError, RippleRenderer, Ripples, RippleWarning  # noqa: E402
 from ripple_sim.export.environment_renders import depth_buffer  # noqa: E402
-from ripple_sim.gymnasium import RippleWrapper, environment_camera, frame_size, model_and_data  # noqa: E402
+from ripple_sim.gymnasium import (  # noqa: E402
+    RippleWrapper,
+    environment_camera,
+    frame_size,
+    model_and_data,
+)
 from ripple_sim.render import find_viewpoint  # noqa: E402
 
 N = 16
@@ -28,7 +33,8 @@ MASS = 0.3
 GRAVITY = 9.81
 MODEL = f"""<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/>
 <geom name="block" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1" solref="0.01 0.3"/>
-<body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
+<body name="ball" pos="0.03 0.02 0.06"><freejoint/>
+<geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
 <body pos="0 0 2"><joint name="idle"/><geom name="idle" size="0.01"/></body></worldbody>
 <actuator><motor joint="idle" ctrlrange="-1 1"/></actuator></mujoco>"""
 MATERIALS = {"block": Material(speed=1.0, density=100.0)}
@@ -393,7 +399,7 @@ def test_gymnasium_finds_no_fault_where_a_target_is_touched_at_the_first_step(pa
 
 def test_environments_without_a_model_are_refused() -> None:
     with pytest.raises(
-        RippleError, match=r"CartPole.* has no `model` and `data`; valid are MuJoCo environments"
+        RippleError, match=r"CartPole.* has no `model` and `data`: it must be a MuJoCo environment"
     ):
         RippleWrapper(gymnasium.make("CartPole-v1"), MATERIALS)
 
@@ -408,7 +414,8 @@ def test_without_gymnasium_the_message_names_the_extra(monkeypatch: pytest.Monke
 
 VIEWED = """<mujoco><visual><global fovy="38"/></visual><worldbody><geom type="plane" size="2 2 1"/>
 <body pos="0.3 -0.2 1"><freejoint/><geom size="0.1"/><geom size="0.1" pos="0.2 0 0"/>
-<camera name="track" mode="trackcom" pos="0 -3 0.3" xyaxes="1 0 0 0 0 1" fovy="50"/></body></worldbody></mujoco>"""
+<camera name="track" mode="trackcom" pos="0 -3 0.3" xyaxes="1 0 0 0 0 1" fovy="50"/></body>
+</worldbody></mujoco>"""
 TRACKING = {
     "trackbodyid": 1,
     "lookat": np.array([0.0, 0.1, 2.0]),
@@ -418,7 +425,7 @@ TRACKING = {
 
 
 def pose_of_mujoco(model: mujoco.MjModel, data: mujoco.MjData, camera_id: int, config: dict):
-    """Position and view of Gymnasium's camera: free by default, aimed at the median, with the settings on top."""
+    """Pose and view of Gymnasium's camera: free, aimed at the median, with settings."""
     camera = mujoco.MjvCamera()
     scene = mujoco.MjvScene(model, 100)
     camera.type = (
@@ -494,7 +501,8 @@ def test_observations_with_sensors(path: Path) -> None:
     again, _ = env.reset(seed=0)
     assert not again["sag"].any()
     with pytest.raises(
-        RippleError, match=r"'tap' has 5\.01 samples in a control step of 0\.01 s; valid"
+        RippleError,
+        match=r"'tap' has 5\.01 samples in a control step of 0\.01 s: this must be a whole number",
     ):
         RippleWrapper(
             BallEnv(path), materials, sensors={"tap": sensors["tap"] | {"rate": 501}}, **OPTIONS

@@ -1,4 +1,4 @@
-"""A program that made its own OpenGL context current keeps it beside ripples, renderers and reports."""
+"""A program's own current OpenGL context stays current beside ours."""
 
 from collections.abc import Callable
 
@@ -17,7 +17,7 @@ MODEL = """<mujoco><worldbody><light pos="0 0 3"/><geom type="plane" size="2 2 1
 
 @pytest.fixture
 def keeps(opengl: None, monkeypatch: pytest.MonkeyPatch):
-    """Calls a function with none of our contexts made before, and checks what is current afterwards."""
+    """Call a function before any of our contexts exist; check the current context."""
     monkeypatch.setattr(context, "_shared", {})
     with own_context() as own:
 

@@ -1,4 +1,4 @@
-"""Sensors of scene files: checked, exported in every format, stored by batches, drawn over frames."""
+"""Sensors of scene files: checked, exported, stored by batches, drawn."""
 
 import csv
 import wave
@@ -137,12 +137,12 @@ def test_traces_are_drawn(opengl: None, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("sensors", "message"),
     [
-        (SENSORS + SENSORS, "two sensors are called 'top'"),
+        (SENSORS + SENSORS, "got two sensors called 'top'"),
         (SENSORS.replace('site = "top"', ""), "sensor 'top' needs one of site, point and points"),
         (SENSORS.replace('site = "top"', 'site = "tip"'), "no site 'tip'; its sites are top"),
         (
             SENSORS.replace('geom = "ball"', 'geom = "bell"'),
-            "on 'bell', which does not ripple; valid are 'ball'",
+            "on 'bell', which does not ripple; targets are 'ball'",
         ),
     ],
 )

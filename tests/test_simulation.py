@@ -72,7 +72,7 @@ def test_slow_motion_shows_the_same_simulation_more_often(scene: Scene, tmp_path
     ]
     # it falls freely: at frame k, k / 25 s have gone by
     np.testing.assert_allclose(heights[0] - heights, 9.81 / 2 * (np.arange(3) / 25) ** 2, rtol=0.06)
-    with pytest.raises(SceneError, match=r"slow motion is 2000.*up to 1000"):
+    with pytest.raises(SceneError, match=r"slow motion must be .* up to 1000, got 2000"):
         render_video(scene, tmp_path / "none.mp4", VideoOptions(slow_motion=2000))
 
 

@@ -1,4 +1,4 @@
-"""Sound: Rayleigh's integral against the closed form of a piston, partials of the drums, and the track of a video."""
+"""Sound: Rayleigh's integral for a piston, partials of drums, and the video's track."""
 
 import math
 import wave
@@ -21,7 +21,7 @@ from ripple_sim.sound import DENSITY, RATE, SPEED, Ear, gain, write_wav
 
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
 def test_a_piston_on_its_axis(opengl: None, backend: str) -> None:
-    """A velocity v that begins at once sounds as rho c v until the edge is heard, too (Stepanishen 1971)."""
+    """A sudden velocity v sounds as rho c v until the edge is heard (Stepanishen 1971)."""
     atlas = texel_atlas(disk(24))
     timestep = 2e-5
     speed = 0.01
@@ -177,7 +177,7 @@ def test_a_video_with_sound(opengl: None, tmp_path: Path) -> None:
         assert float(
             file.streams.audio[0].duration * file.streams.audio[0].time_base
         ) == pytest.approx(0.6, abs=0.03)
-    with pytest.raises(VideoError, match=r"has no sound; valid are \.mp4 and \.webm"):
+    with pytest.raises(VideoError, match=r"has no sound: write \.mp4 or \.webm"):
         render_video(egg_scene(tmp_path), tmp_path / "a.gif", options)
 
 

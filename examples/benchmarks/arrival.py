@@ -1,4 +1,4 @@
-"""When does a wave arrive? Errors of the times of arrival, by every formula and on both sphere maps.
+"""Errors of the times at which a wave arrives, for every formula and both sphere maps.
 
     python examples/benchmarks/arrival.py [MESH ...] [--resolution 96] [--sources 3] [--elements]
 
@@ -63,7 +63,7 @@ _LEAST = 0.2
 def front_and_crest(
     times: NDArray, signal: NDArray
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times [k] of the front and of the first crest in signals [time, k], interpolated between the samples.
+    """Times [k] of the front and of the first crest in signals [time, k], interpolated.
 
     The front is where the signal first reaches half of that crest. Both are NaN where there is no
     crest.
@@ -92,7 +92,7 @@ def front_and_crest(
 
 
 def geodesic_distance(mesh: Mesh, source: int) -> NDArray[np.float64]:
-    """Exact distance along the surface of every vertex from one of them [m]; infinite on other parts of the mesh."""
+    """Exact geodesic distance of every vertex from one vertex [m]; infinite on other parts."""
     vertices = _reached_vertices(mesh, source)
     none = np.empty(0, dtype=np.int64)
     distance = np.full(len(mesh.V), np.inf)
@@ -114,7 +114,7 @@ NEAREST = 5.0
 
 
 def plane_arrival(distance: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times of the front and the crest on the plane for the same bump; lengths in widths, wave speed 1."""
+    """Times of the front and the crest of the bump on a plane; lengths in widths, speed 1."""
     # as far as the next power of 2: a table takes a second, and every source has another farthest
     # vertex
     farthest = 2 ** np.ceil(np.log2(max(np.max(distance, initial=0), NEAREST + 1)))
@@ -124,7 +124,10 @@ def plane_arrival(distance: NDArray[np.float64]) -> tuple[NDArray[np.float64], N
 
 @functools.lru_cache(maxsize=16)
 def _plane_table(farthest: float) -> tuple[NDArray[np.float64], ...]:
-    """h(r, t) = integral of exp(-q^2 / 2) J0(q r) cos(q t) q dq, the bump's Hankel transform carried on in time."""
+    """The bump's wave on a plane by its Hankel transform.
+
+    h(r, t) = integral of exp(-q^2 / 2) J0(q r) cos(q t) q dq.
+    """
     grid = np.linspace(NEAREST - 1, farthest, 96)
     q = np.linspace(0, 8, 2001)[1:]
     spectrum = q * np.exp(-q * q / 2)
@@ -147,7 +150,7 @@ _SAMPLES_PER_WIDTH = 6
 
 @dataclasses.dataclass(frozen=True)
 class ArrivalError:
-    """Relative errors of arrival times over the vertices of a mesh: median, 90 % quantile, and share under 3 %."""
+    """Relative errors of arrival over a mesh: median, 90 % quantile, and share under 3 %."""
 
     front_median: float
     front_q90: float
@@ -159,19 +162,19 @@ class ArrivalError:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Arrival:
-    """Times of arrival at the vertices of a mesh over the expected ones: 1 is exact, NaN where no crest arrives.
+    """Arrival times at the vertices over the expected times: 1 is exact.
 
     Attributes
     ----------
     front, crest : float64 [k]
-        Of the vertices that are far enough from the source.
+        Of the vertices that are far enough from the source; NaN where no crest arrives.
     """
 
     front: NDArray[np.float64]
     crest: NDArray[np.float64]
 
     def at_speed(self, factor: float) -> Arrival:
-        """The same arrivals with waves that are so much faster: the wave equation's times scale exactly."""
+        """The same arrivals with waves faster by a factor, by which all times scale exactly."""
         return Arrival(self.front / factor, self.crest / factor)
 
     def error(self) -> ArrivalError:
@@ -188,7 +191,7 @@ class Arrival:
 
 
 def arrival(atlas: Atlas, source: int, operator: str = "fem", speed: float = 1.0) -> Arrival:
-    """Arrival at all vertices that can be reached from the vertex `source`; expected is a wave speed of 1 m/s.
+    """Arrival at all vertices that can be reached from the vertex `source`, at 1 m/s.
 
     The solver's own speed [m/s] differs from that where a formula is calibrated.
     """
@@ -211,7 +214,7 @@ def ideal_width(atlas: Atlas) -> float:
 
 
 def vertex_coordinates(atlas: Atlas) -> NDArray[np.float64]:
-    """Map coordinates of the mesh's vertices, [vertex_count, d], each in a triangle of its own sheet."""
+    """Map coordinates of the mesh's vertices [vertex_count, d], each in its own triangle."""
     mesh = atlas.mesh
     triangle = np.zeros(len(mesh.V), np.int64)
     triangle[mesh.F] = np.arange(len(mesh.F))[:, None]
@@ -224,10 +227,11 @@ FINENESS = 2.0  # vertices of the elements in the width of a texel
 def elements_waves(
     mesh: Mesh, source: int, width: float, distance: float, texels: float = WIDTH
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times [s], [t], and heights at all vertices, [t, n], of the same bump's wave, by linear elements and leapfrog.
+    """Wave of the same bump by linear elements and leapfrog: times and heights.
 
-    Masses are lumped. The triangles are cut in four until there are `FINENESS` vertices in a texel,
-    of which the bump's width [m] has `texels`; a wave of 1 m/s is followed for `distance` [m].
+    Returns times [t] in seconds and heights at all vertices [t, n]. Masses are lumped. Triangles
+    are cut into four until a texel has `FINENESS` vertices; the bump's width [m] has `texels`
+    texels. The wave runs at 1 m/s for `distance` [m].
     """
     V = mesh.V
     F = mesh.F
@@ -258,7 +262,7 @@ def _times(width: float, distance: float) -> NDArray[np.float64]:
 
 
 def _distance_near(V: NDArray, F: NDArray, source: int, limit: float) -> NDArray[np.float64]:
-    """Exact distance from one vertex [m]; infinite beyond a limit [m], where no way is searched for."""
+    """Exact geodesic distance from one vertex [m]; infinite beyond a limit [m]."""
     near = np.linalg.norm(V - V[source], axis=1) < 1.1 * limit
     triangles = F[near[F].all(axis=1)]
     # not another limb beside it: what no way leads to would be at no distance
@@ -275,7 +279,7 @@ def _distance_near(V: NDArray, F: NDArray, source: int, limit: float) -> NDArray
 
 
 def paper_atlas(mesh: Mesh, resolution: int) -> Atlas:
-    """Atlas in the cube layout, for which the paper's formula is made; patches where a mesh does not fit that."""
+    """Atlas in the cube layout, or in the patch layout for a mesh that the cube does not fit."""
     try:
         return build_atlas(mesh, resolution, layout="cube")
     except MeshError:
@@ -283,7 +287,7 @@ def paper_atlas(mesh: Mesh, resolution: int) -> Atlas:
 
 
 def against_elements(meshes: dict[str, Mesh], resolution: int, sources: int) -> str:
-    """Median and 90 % quantile of the errors of fronts, source by source, and of the plane's, as a table."""
+    """A table of the errors of fronts: median and 90 % quantile, by source, and the plane's."""
     rows = []
     for name, mesh in meshes.items():
         atlas = paper_atlas(mesh, resolution)
@@ -331,7 +335,9 @@ def against_elements(meshes: dict[str, Mesh], resolution: int, sources: int) -> 
 def distance_from_point(
     texels: TexelMesh, center: int, point: NDArray[np.float64], limit: float
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Texels within `limit` [m] of a surface point, ascending, and their distances along the surface [m].
+    """Texels within `limit` [m] of a surface point, and their distances along the surface.
+
+    Texels are in ascending order.
 
     Parameters
     ----------
@@ -419,7 +425,7 @@ Row = dict[str, float] | None
 def arrivals(
     meshes: dict[str, Mesh], resolution: int = 96, sources: int = 3
 ) -> dict[str, dict[str, Row]]:
-    """Errors of arrival on the project's own test body and on given meshes, mean over the sources."""
+    """Errors of arrival on the test body and on given meshes, averaged over the sources."""
     bodies = {"limbed": Mesh.from_arrays(*limbed())} | meshes
     return {name: _rows(mesh, resolution, sources) for name, mesh in bodies.items()}
 

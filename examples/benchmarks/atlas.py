@@ -25,11 +25,11 @@ from ripple_sim.solver.layouts.cube import texel_directions
 def cast_rays_exhaustively(
     sphere: NDArray[np.float64], F: NDArray[np.int64], directions: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Intersect rays from the origin with all triangles (Moeller and Trumbore 1997): slow, simple, the oracle.
+    """Intersect rays from the origin with all triangles: the slow and simple oracle.
 
-    Parameters and results are those of `cast_rays`. The cost is the number of rays times that of
-    triangles. Where a ray meets several triangles on the edge that they share, the one in which it
-    lies deepest is taken.
+    The method is that of Moeller and Trumbore (1997). Parameters and results are those of
+    `cast_rays`. The cost is the number of rays times the number of triangles. Where a ray meets
+    several triangles on a shared edge, the triangle in which the ray lies deepest is taken.
     """
     corner = sphere[F[:, 0]]
     edge1 = sphere[F[:, 1]] - corner

@@ -1,4 +1,4 @@
-"""How long would a MOVi-like set take: 10,000 scenes of 24 frames, 256x256, on two cores, and on 1,000 workers?
+"""Time for 10,000 scenes of 24 frames of 256x256: on two cores, and on 1,000 workers.
 
     python examples/benchmarks/batch_cluster.py DIR [--workers 1000] [--seed 0]
 
@@ -31,7 +31,7 @@ FIRST = 60.0
 
 
 def handed_out(count: int = 2000) -> float:
-    """Seconds that the scheduler and the program take for a scene, at most, by scenes that take no time."""
+    """Time of the scheduler and the program for a scene [s]: scenes that take no time."""
     from distributed import LocalCluster
 
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
@@ -48,7 +48,7 @@ def handed_out(count: int = 2000) -> float:
 
 
 def makespan(seconds: NDArray[np.float64], workers: int, books: float) -> float:
-    """Time until all scenes are made by workers that each take the next one as soon as they are free [s]."""
+    """Time until all scenes are done if each free worker takes the next scene [s]."""
     ready = [START + FIRST] * workers
     heapq.heapify(ready)
     scheduler = ended = 0.0

@@ -1,4 +1,4 @@
-"""Is a batch that is killed again and again the same as an unbroken one? Tried on the program itself.
+"""A batch that is killed again and again gives the same result as an unbroken batch.
 
     python examples/benchmarks/batch_kills.py [SCENE] [--kills 20] [--scenes 60] [--workers 2]
 

@@ -1,4 +1,4 @@
-"""Which route of `make_collidable` when? Bodies of several shapes drop on a mesh that collides by each of them.
+"""Compare the routes of `make_collidable`: bodies of several shapes drop on a mesh.
 
     python examples/benchmarks/collision_routes.py [--drops 8]
 
@@ -218,7 +218,8 @@ def main() -> None:
     drops = parser.parse_args().drops
     warnings.simplefilter("ignore", RippleWarning)
     print(
-        f"{'route':8}{'touched by':15}{'place':>8}{'largest':>9}{'momentum':>10}{'thrown':>8}{'ms':>8}"
+        f"{'route':8}{'touched by':15}{'place':>8}{'largest':>9}{'momentum':>10}"
+        f"{'thrown':>8}{'ms':>8}"
     )
     for route in ROUTES:
         for kind in (*BODIES, "stacked boxes", "plane"):
@@ -228,7 +229,8 @@ def main() -> None:
                 (np.median(place) / 0.9, place.max() / 0.9) if len(place) else (np.nan, np.nan)
             )
             print(
-                f"{route:8}{kind:15}{middle:8.2%}{largest:9.2%}{momentum:10.1%}{thrown:8.2f}{1000 * seconds:8.3f}",
+                f"{route:8}{kind:15}{middle:8.2%}{largest:9.2%}{momentum:10.1%}"
+                f"{thrown:8.2f}{1000 * seconds:8.3f}",
                 flush=True,
             )
 

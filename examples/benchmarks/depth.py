@@ -39,7 +39,10 @@ def mjcf(shape: str, count: int, width: int, height: int) -> str:
 
 
 def serve(pipe: Connection, ours: bool, shape: str, count: int, width: int, height: int) -> None:
-    """Draw as many frames as the pipe asks for, and send back their mean processor time [s] by kind, until it is 0."""
+    """Draw the frames that the pipe asks for; send back mean processor times [s] by kind.
+
+    A request for 0 frames ends the loop.
+    """
     os.environ["MUJOCO_GL"] = "egl"
     import mujoco
 

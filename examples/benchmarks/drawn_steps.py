@@ -1,4 +1,4 @@
-"""The paper's table 1 with drawing: frames a second over resolution and polygon count, a wave step and a frame each.
+"""The paper's table 1 with drawing: frames a second by resolution and polygon count.
 
     python examples/benchmarks/drawn_steps.py [--size 640x480] [--polygons 2700,21300] [--backends
     cpu,gl]

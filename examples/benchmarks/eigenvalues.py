@@ -52,11 +52,14 @@ Points = Values = np.ndarray
 
 
 # Meshes
-# -------------------------------------------------------------------------------------------------------------
+# -------------------------------------------------------------------------------------------------
 
 
 def grid(columns: int, rows: int, place: Callable, closed: bool = False) -> Mesh:
-    """Squares cut into triangles; place takes two arrays from 0 to 1 to points; a closed grid ends where it begins."""
+    """Squares cut into triangles; a closed grid ends where it begins.
+
+    `place` maps two arrays from 0 to 1 to points.
+    """
     a, b = np.meshgrid(np.arange(columns + 1) / columns, np.arange(rows + 1) / rows, indexing="ij")
     V = np.stack(np.broadcast_arrays(*place(a, b)), axis=-1).reshape(-1, 3)
     node = np.arange(len(V)).reshape(columns + 1, rows + 1)
@@ -72,7 +75,10 @@ def grid(columns: int, rows: int, place: Callable, closed: bool = False) -> Mesh
 
 
 def rings(place: Callable) -> Mesh:
-    """Rings of 6, 12, 18 ... points around a centre; place takes radii from 0 to 1, cosines and sines to points."""
+    """Rings of 6, 12, 18 ... points around a centre.
+
+    `place` maps radii from 0 to 1, cosines and sines to points.
+    """
     radius = np.repeat(np.arange(RINGS + 1), np.maximum(6 * np.arange(RINGS + 1), 1))
     number = np.concatenate([np.arange(max(6 * k, 1)) for k in range(RINGS + 1)])
     angle = number * 2 * np.pi / np.maximum(6 * radius, 1)
@@ -151,7 +157,10 @@ def degrees(multiplicity: Callable[[int], int]) -> Values:
 
 
 def torus_values() -> Values:
-    """Of the torus, whose modes are waves around the axis times a function around the tube; that, by Fourier series."""
+    """Eigenvalues of the torus.
+
+    The modes are waves around the axis times a function around the tube, found by Fourier series.
+    """
     n = 121
     v = 2 * np.pi * np.arange(n) / n
     apart = np.subtract.outer(np.arange(n), np.arange(n))
@@ -180,7 +189,10 @@ def square_values(first: int) -> Values:
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A surface: its mesh, the way from that to the true surface (None: it is that), its rim, and its eigenvalues."""
+    """A surface: its mesh, its rim, its eigenvalues, and the map to the true surface.
+
+    The map is None where the mesh is the true surface.
+    """
 
     mesh: Callable[[], Mesh]
     project: Callable[[Points], Points] | None
@@ -202,7 +214,7 @@ def cases() -> dict[str, Case]:
 
 
 # Measured
-# -----------------------------------------------------------------------------------------------------------
+# -------------------------------------------------------------------------------------------------
 
 
 def placed(atlas: Atlas, project: Callable[[Points], Points] | None) -> Atlas:
@@ -220,7 +232,7 @@ def placed(atlas: Atlas, project: Callable[[Points], Points] | None) -> Atlas:
 
 
 def mean_error(atlas: Atlas, case: Case) -> float:
-    """Mean relative error of the eigenvalues up to the twentieth but for that of the constant mode."""
+    """Mean relative error of the eigenvalues 2 to 20, without the constant mode."""
     return float(
         errors_against(np.sort(case.exact)[:COUNT], placed(atlas, case.project), case.rim).mean()
     )
@@ -234,7 +246,10 @@ def errors_against(exact: Values, atlas: Atlas, rim: str = "free") -> Values:
 
 
 def least(stiffness: csr_array, mass: csr_array) -> Values:
-    """The twenty least eigenvalues; of equal ones at the end of those that are asked for one may be missed."""
+    """The twenty least eigenvalues.
+
+    The solver may miss one of several equal eigenvalues at the end, so it is asked for more.
+    """
     scale = float(mass.diagonal().sum())
     values = eigsh(
         scale * stiffness.tocsc(),
@@ -256,7 +271,7 @@ def halved(mesh: Mesh, times: int) -> tuple[Points, Values]:
 
 
 def of_linear_elements(V: Points, F: Values) -> Values:
-    """The twenty least eigenvalues of a mesh, rims free, by its vertices' cotangent weights and shares of the area."""
+    """The twenty least eigenvalues of a mesh by cotangent weights and vertex areas; free rims."""
     return least(
         csr_array(-igl.cotmatrix(V, F)),
         csr_array(igl.massmatrix(V, F, igl.MASSMATRIX_TYPE_BARYCENTRIC)),
@@ -264,7 +279,7 @@ def of_linear_elements(V: Points, F: Values) -> Values:
 
 
 def of_polyhedron(mesh: Mesh, halvings: int) -> Values:
-    """The twenty least eigenvalues of a mesh as it is, rims free, by quadratic elements on its halved triangles."""
+    """The twenty least eigenvalues of a mesh by quadratic elements on half triangles; free rims."""
     V, F = halved(mesh, halvings)
     sides = np.sort(F[:, [[0, 1], [1, 2], [2, 0]]], axis=-1).reshape(-1, 2)
     edges, of_side = np.unique(sides, axis=0, return_inverse=True)

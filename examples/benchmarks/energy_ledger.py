@@ -59,12 +59,33 @@ INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
 FLAGS = [
     flag
     for flag in (
-        "equality", "frictionloss", "limit", "damper", "spring", "clampctrl", "warmstart", "filterparent",
-        "actuation", "refsafe", "sensor", "midphase", "eulerdamp", "autoreset", "nativeccd", "island", "multiccd",
-        "override", "energy", "fwdinv", "invdiscrete", "sleep", "diagexact",
+        "equality",
+        "frictionloss",
+        "limit",
+        "damper",
+        "spring",
+        "clampctrl",
+        "warmstart",
+        "filterparent",
+        "actuation",
+        "refsafe",
+        "sensor",
+        "midphase",
+        "eulerdamp",
+        "autoreset",
+        "nativeccd",
+        "island",
+        "multiccd",
+        "override",
+        "energy",
+        "fwdinv",
+        "invdiscrete",
+        "sleep",
+        "diagexact",
     )
-    if hasattr(mujoco.mjtEnableBit, f"mjENBL_{flag.upper()}") or hasattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}")
-]  # fmt: skip
+    if hasattr(mujoco.mjtEnableBit, f"mjENBL_{flag.upper()}")
+    or hasattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}")
+]
 
 
 def random_options(rng: np.random.Generator) -> tuple[str, str]:
@@ -120,9 +141,11 @@ def random_scene(rng: np.random.Generator) -> Scene:
     gravity = 0.0 if free else -9.81
     above = TOPS[target] + 1.8 * radius
     model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="{dt}" {options} gravity="0 0 {gravity}"><flag {flags}/></option>
+        f"""<mujoco><option timestep="{dt}" {options} gravity="0 0 {gravity}"><flag {flags}/>
+        </option>
         <asset><mesh name="prism" vertex="{PRISM}"/>
-        <mesh name="stone" vertex="{STONE}" scale="{0.6 * radius} {0.6 * radius} {0.6 * radius}"/></asset>
+        <mesh name="stone" vertex="{STONE}" scale="{0.6 * radius} {0.6 * radius} {0.6 * radius}"/>
+        </asset>
         <default><geom {contact}/></default><worldbody>
         <body>{spring}<geom name="target" {TARGETS[target]} mass="{weight}"/></body>
         <body name="body" pos="{x} {y} {above + fall}" euler="{angles}"><freejoint/>

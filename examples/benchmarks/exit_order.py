@@ -1,4 +1,4 @@
-"""Our renderer, MuJoCo's and pyvista's in one process, in any order, kept to the end or dropped: no crash at exit.
+"""Our renderer, MuJoCo's and pyvista's in one process, in any order: no crash at exit.
 
     python examples/benchmarks/exit_order.py [ours mujoco pyvista]
 
@@ -25,7 +25,8 @@ USES = {
     "ours": """
 from ripple_sim import Material, RippleError, RippleRenderer, Ripples
 try:
-    ripples = Ripples(model, {'ball': Material(speed=1.0, density=10.0)}, resolution=8, backend='gl')
+    material = Material(speed=1.0, density=10.0)
+    ripples = Ripples(model, {'ball': material}, resolution=8, backend='gl')
     ours = RippleRenderer(model, ripples, width=64, height=48)
     ours.render(data)
 except RippleError as error:  # after a plotter

@@ -35,7 +35,7 @@ STEPS = 10
 
 @contextmanager
 def stage(name: str) -> Iterator[None]:
-    """Print how long a stage takes, on the clock and of all cores, and the memory that was resident at most so far."""
+    """Print the time of a stage, on the clock and of all cores, and the peak memory so far."""
     clock = time.perf_counter()
     processor = time.process_time()
     yield
@@ -46,7 +46,10 @@ def stage(name: str) -> Iterator[None]:
 
 
 def subdivided(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The duck with so many triangles: all cut into four while there is room, then some of them into three."""
+    """The duck with a given number of triangles.
+
+    All are cut into four while there is room, then some of them into three.
+    """
     V, F = duck()
     while 4 * len(F) <= count:
         edges, at = np.unique(

@@ -1,4 +1,4 @@
-"""What do a wave step and a frame cost in the patch layout, against the cube layout of the same mesh?
+"""Cost of a wave step and of a frame: the patch layout against the cube layout.
 
     python examples/benchmarks/layouts.py [MESH] [--resolution 128] [--size 1280x720] [--frames 15]
 

@@ -1,4 +1,4 @@
-"""Does anything stay of what is made and dropped? Memory, file descriptors and objects of OpenGL, 500 times each.
+"""Leaks: memory, file descriptors and OpenGL objects after 500 rounds of each object.
 
     python examples/benchmarks/leaks.py [--times 500] [solver-cpu solver-gl renderer everything
     viewer]
@@ -23,7 +23,8 @@ from ripple_sim import Material, RippleRenderer, Ripples
 from ripple_sim.solver import WaveSolver, sphere_atlas
 
 MODEL = """<mujoco><worldbody><light pos="0 0 3"/><geom type="plane" size="2 2 1"/>
-  <body pos="0 0 1"><freejoint/><geom name="ball" type="sphere" size="0.3"/></body></worldbody></mujoco>"""
+  <body pos="0 0 1"><freejoint/><geom name="ball" type="sphere" size="0.3"/></body></worldbody>
+  </mujoco>"""
 
 
 def solver(backend: str) -> Callable[[], None]:

@@ -25,7 +25,8 @@ MASS = 0.3
 GRAVITY = 9.81
 MODEL = f"""<mujoco><option timestep="0.002"/><worldbody>
   <geom name="block" type="box" size="0.5 0.5 0.2" pos="0 0 -0.2" solref="0.01 0.3"/>
-  <body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
+  <body name="ball" pos="0.03 0.02 0.06"><freejoint/>
+  <geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
 </worldbody></mujoco>"""
 MATERIALS = {"block": Material(speed=1.0, density=100.0)}
 

@@ -1,4 +1,4 @@
-"""Does memory grow with the length of a video? The peak of a long render against that of a short one.
+"""Memory over the length of a video: the peak of a long render against a short one's.
 
     python examples/benchmarks/memory.py [SCENE] [--short 5] [--long 60] [-- OPTIONS OF ripple-sim
     render]

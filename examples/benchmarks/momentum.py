@@ -35,7 +35,7 @@ MOCAP = '<body name="hand" mocap="true" pos="0.1 0 {}">{}</body>'
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """What pushes the plate: more bodies, more elements of the model, options, and what a script does in each step."""
+    """What pushes the plate: bodies, elements of the model, options, and a script's steps."""
 
     bodies: str
     more: str = ""
@@ -81,11 +81,13 @@ CASES = {
     ),
     "pulled by a tendon": Case(
         DRIVEN,
-        """<tendon><fixed stiffness="300" springlength="-0.3"><joint joint="ball" coef="1"/></fixed></tendon>""",
+        """<tendon><fixed stiffness="300" springlength="-0.3"><joint joint="ball" coef="1"/></fixed>
+        </tendon>""",
     ),
     "held by a tendon at its limit": Case(
         FREE.format("") + '<site name="above" pos="0.1 0 0.4"/>',
-        """<tendon><spatial limited="true" range="0 0.301"><site site="above"/><site site="on"/></spatial></tendon>""",
+        """<tendon><spatial limited="true" range="0 0.301"><site site="above"/><site site="on"/>
+        </spatial></tendon>""",
         speed=-1.0,
     ),
     "stuck by an adhesion actuator": Case(
@@ -111,7 +113,8 @@ CASES = {
     ),
     "target in a chain": Case(
         FREE.format(""),
-        plate=f"""<body><joint type="slide" axis="1 0 0"/><inertial pos="0 0 0" mass="3" diaginertia="1 1 1"/>
+        plate=f"""<body><joint type="slide" axis="1 0 0"/>
+        <inertial pos="0 0 0" mass="3" diaginertia="1 1 1"/>
             {PLATE}</body>""",
         speed=-1.0,
     ),
@@ -128,7 +131,8 @@ CASES = {
 def measure(case: Case) -> tuple[float, float]:
     """Momentum that the plate gained, and impulses on its surface [N s]."""
     model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="0.001" gravity="0 0 0" {case.option}<default><geom condim="1"/></default>
+        f"""<mujoco><option timestep="0.001" gravity="0 0 0" {case.option}<default>
+        <geom condim="1"/></default>
         {case.more}<worldbody>{case.plate}{case.bodies}</worldbody></mujoco>"""
     )
     data = mujoco.MjData(model)

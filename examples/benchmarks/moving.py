@@ -1,4 +1,4 @@
-"""What it costs to move a surface: the stiffness made anew, a step of the waves, a frame, over those of a fixed one.
+"""Cost of a surface that moves over a fixed one: stiffness, wave step and frame.
 
 python examples/benchmarks/moving.py
 """
@@ -27,7 +27,7 @@ VERTICES = 160_000
 
 
 def best(work: Callable[[int], object], count: int = 12) -> float:
-    """Least processor time of several runs [ms]: that of all cores, which a busy machine does not change much."""
+    """Least processor time of all cores in several runs [ms]: little changed by a busy machine."""
     taken = []
     for i in range(count):
         start = time.process_time()
@@ -170,10 +170,12 @@ def counted_twice() -> None:
 
 
 def frames() -> None:
-    """A frame with a moving target over one with a fixed one: 8 physics steps, waves, and the picture."""
+    """A frame with a moving target over one with a fixed target: 8 steps, waves, the picture."""
     model = mujoco.MjModel.from_xml_string(
-        """<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/><geom type="plane" size="3 3 .1"/>
-        <geom name="target" type="ellipsoid" size=".3 .3 .4" pos="0 0 .4" rgba=".2 .4 .6 1"/></worldbody></mujoco>"""
+        """<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/>
+        <geom type="plane" size="3 3 .1"/>
+        <geom name="target" type="ellipsoid" size=".3 .3 .4" pos="0 0 .4" rgba=".2 .4 .6 1"/>
+        </worldbody></mujoco>"""
     )
     data = mujoco.MjData(model)
     ripples = Ripples(

@@ -1,4 +1,4 @@
-"""What do overlays cost? Processor seconds a frame with and without, in turns on the same states of a scene.
+"""Cost of overlays: processor time of a frame with and without, on the same states.
 
     python examples/benchmarks/overlay.py [--scene duck] [--size 1280x720] [--frames 12]
 

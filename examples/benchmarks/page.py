@@ -60,7 +60,7 @@ def processor_time() -> float:
 
 
 def played(browser: Any, page: Path) -> tuple[float, float, float, float]:
-    """Frames a second, processor time a frame [ms], the share of the pixels each way, and the time of drawing [ms]."""
+    """Frames a second, processor time a frame [ms], changed pixels by direction, drawing [ms]."""
     tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
     tab.goto(page.resolve().as_uri())
     tab.evaluate("ripplePlayer.ready.then(() => 0)")

@@ -30,7 +30,7 @@ def on_one_side(points: np.ndarray) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class Plate:
-    """A table: side [m], or 0 for the unit disk; material, rim, frequencies over [1/s], and those of the table."""
+    """A published table: side [m] (0: the unit disk), material, rim, unit and frequencies."""
 
     side: float
     material: Material
@@ -41,20 +41,38 @@ class Plate:
 
 PLATES = {
     "supported [Hz], NAFEMS": Plate(
-        10.0, NAFEMS, "supported", 2 * np.pi, (2.377, 5.942, 5.942, 9.507, 11.884, 11.884, 15.449, 15.449)
+        10.0,
+        NAFEMS,
+        "supported",
+        2 * np.pi,
+        (2.377, 5.942, 5.942, 9.507, 11.884, 11.884, 15.449, 15.449),
     ),
-    "free [Hz], NAFEMS FV12": Plate(10.0, NAFEMS, "free", 2 * np.pi, (1.622, 2.360, 2.922, 4.233, 4.233, 7.416)),
+    "free [Hz], NAFEMS FV12": Plate(
+        10.0, NAFEMS, "free", 2 * np.pi, (1.622, 2.360, 2.922, 4.233, 4.233, 7.416)
+    ),
     "free, lambda^2, Barton": Plate(1.0, UNIT, "free", 1.0, (13.49, 19.79, 24.43, 35.02, 35.02)),
-    "free, lambda^2, Leissa": Plate(1.0, UNIT, "free", 1.0, (13.468, 19.596, 24.270, 34.801, 34.801, 61.093)),
-    "cantilever, lambda^2, Barton": Plate(1.0, UNIT, on_one_side, 1.0, (3.492, 8.525, 21.43, 27.33, 31.11, 54.44)),
-    "clamped [rad/s], Birger": Plate(1.0, BIRGER, "clamped", 1.0, (560.1, 1143.2, 1143.2, 1686.6, 2054.0, 2054.0)),
-    "clamped, lambda^2, Leissa": Plate(1.0, UNIT, "clamped", 1.0, (35.992, 73.413, 73.413, 108.27, 131.64, 132.24)),
+    "free, lambda^2, Leissa": Plate(
+        1.0, UNIT, "free", 1.0, (13.468, 19.596, 24.270, 34.801, 34.801, 61.093)
+    ),
+    "cantilever, lambda^2, Barton": Plate(
+        1.0, UNIT, on_one_side, 1.0, (3.492, 8.525, 21.43, 27.33, 31.11, 54.44)
+    ),
+    "clamped [rad/s], Birger": Plate(
+        1.0, BIRGER, "clamped", 1.0, (560.1, 1143.2, 1143.2, 1686.6, 2054.0, 2054.0)
+    ),
+    "clamped, lambda^2, Leissa": Plate(
+        1.0, UNIT, "clamped", 1.0, (35.992, 73.413, 73.413, 108.27, 131.64, 132.24)
+    ),
     "disk, supported, lambda^2, Leissa": Plate(
         0.0, UNIT, "supported", 1.0, (4.935, 13.898, 13.898, 25.613, 25.613, 29.720)
     ),
-    "disk, free, lambda^2, Leissa": Plate(0.0, UNIT, "free", 1.0, (5.358, 5.358, 9.003, 12.439, 12.439)),
-    "disk, clamped, lambda^2, Leissa": Plate(0.0, UNIT, "clamped", 1.0, (10.216, 21.26, 21.26, 34.88, 34.88, 39.771)),
-}  # fmt: skip
+    "disk, free, lambda^2, Leissa": Plate(
+        0.0, UNIT, "free", 1.0, (5.358, 5.358, 9.003, 12.439, 12.439)
+    ),
+    "disk, clamped, lambda^2, Leissa": Plate(
+        0.0, UNIT, "clamped", 1.0, (10.216, 21.26, 21.26, 34.88, 34.88, 39.771)
+    ),
+}
 
 
 def atlas_of(plate: Plate, resolution: int) -> Atlas:

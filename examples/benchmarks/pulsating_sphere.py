@@ -1,4 +1,4 @@
-"""How far off is Rayleigh's integral where its surface is not plane? A sphere that pulsates, against its closed form.
+"""Error of Rayleigh's integral on a surface that is not plane: a pulsating sphere.
 
     python examples/benchmarks/pulsating_sphere.py
 

@@ -106,7 +106,7 @@ def rippled(
 
 
 def cost(work: Callable[[], object]) -> tuple[float, float]:
-    """Seconds on the clock, and of all processor cores together, which a busy machine disturbs less."""
+    """Time on the clock and of all cores together [s]; a busy machine changes the latter less."""
     clock = time.perf_counter()
     processor = time.process_time()
     work()

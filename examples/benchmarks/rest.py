@@ -1,4 +1,4 @@
-"""What the rest filter changes: noise under bodies at rest, hits after a rest, and surfaces that are driven.
+"""The rest filter's effect: noise under bodies at rest, hits after a rest, driven surfaces.
 
     python examples/benchmarks/rest.py
 
@@ -37,7 +37,8 @@ def model_of(target: str, bodies: str, dt: float, solref: str = "0.02 1") -> muj
     )
     return mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{dt}" sdf_initpoints="10"/>
-        <default><geom solref="{solref}" friction="1 0.05 0.05" condim="6"/></default><asset>{mesh}</asset>
+        <default><geom solref="{solref}" friction="1 0.05 0.05" condim="6"/></default>
+        <asset>{mesh}</asset>
         <worldbody><geom name="target" {TARGETS[target][0]}/>{bodies}</worldbody></mujoco>"""
     )
 
@@ -48,7 +49,7 @@ def velocity(waves: WaveSolver) -> float:
 
 
 def run(model: mujoco.MjModel, seconds: float, act=lambda data: None) -> np.ndarray:
-    """Velocities with the filter and without [m/s], [steps, 2]; `act` is called before each step."""
+    """Velocities with and without the filter [m/s], [steps, 2]; `act` runs before each step."""
     data = mujoco.MjData(model)
     dt = model.opt.timestep
     options = {"backend": "cpu", "conserve_volume": False}
@@ -103,11 +104,12 @@ def noise() -> None:
 
 
 def hit(target: str, rest: float, mass: float, speed: float, off: float) -> float:
-    """Highest velocity after a hammer has struck a block that has rested [s], over that without the filter."""
+    """Highest velocity after a hammer hits a block at rest, over that without the filter."""
     top = TARGETS[target][1]
     bodies = f"""<body name="block" pos="0 0 {top + 0.041}"><freejoint/>
         <geom {BODIES["box"]} mass="0.5" conaffinity="3"/></body>
-        <body name="hammer" pos="{off} 0 {top + 0.5}" gravcomp="1"><joint name="hammer" type="slide" axis="0 0 1"/>
+        <body name="hammer" pos="{off} 0 {top + 0.5}" gravcomp="1">
+        <joint name="hammer" type="slide" axis="0 0 1"/>
         <geom size="0.03" mass="{mass}" contype="2" conaffinity="2"/></body>"""
     model = model_of(target, bodies, 0.002)
     joint = model.joint("hammer")
@@ -148,7 +150,8 @@ def driving() -> None:
         "without the filter"
     )
     for target in TARGETS:
-        rod = f"""<body pos="0 0 {TARGETS[target][1] + 0.06}"><joint name="rod" type="slide" axis="0 0 1"/>
+        rod = f"""<body pos="0 0 {TARGETS[target][1] + 0.06}">
+        <joint name="rod" type="slide" axis="0 0 1"/>
             <geom type="capsule" size="0.03 0.03" mass="1"/></body>"""
         ratios = []
         for frequency in (0.5, 5.0, 50.0):

@@ -1,4 +1,4 @@
-"""Is a render that is killed again and again the same as an unbroken one? Tried on the program itself.
+"""A render that is killed again and again gives the same result as an unbroken render.
 
     python examples/benchmarks/resume.py [SCENE] [--kills 20] [--step 1] [--output clip.mp4] [--
     OPTIONS OF render]

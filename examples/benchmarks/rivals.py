@@ -1,4 +1,4 @@
-"""How fast is the wave step against what one would write oneself? One line a resolution, ratios and rates.
+"""Speed of the wave step against kernels written by hand: ratios and rates by resolution.
 
     python examples/benchmarks/rivals.py [--resolutions 128,256,512]
 
@@ -28,7 +28,7 @@ from ripple_sim.solver.texels import stiffness_matrix
 
 
 class NaiveLoop:
-    """Leapfrog in a plain loop, in one thread or, with `parallel`, in numba's threads (`prange` over all rows)."""
+    """Leapfrog in a plain loop, in one thread or, with `parallel`, in numba's threads."""
 
     def __init__(self, operator: WaveOperator, parallel: bool = False) -> None:
         n = operator.mass.shape[1]
@@ -64,7 +64,7 @@ def _fill_halo(h: Floats32, halo: Ints, source: Ints) -> None:
 
 
 class Fields(NamedTuple):
-    """Weights [C, 4, n + 1, n + 1], heights with halo [C, n + 2, n + 2], velocity and gain [C, n, n]."""
+    """Weights [C, 4, n + 1, n + 1], heights [C, n + 2, n + 2], velocity and gain [C, n, n]."""
 
     w: Floats32
     h: Floats32
@@ -112,7 +112,8 @@ UPDATE = Path(__file__).with_name("plain_update.glsl")
 _HALO = """#version 430
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) buffer Field { float x[]; };
-layout(std430, binding = 1) readonly buffer Pairs { ivec2 pairs[]; };  // (place in the halo, texel it shows)
+// (place in the halo, texel that it copies)
+layout(std430, binding = 1) readonly buffer Pairs { ivec2 pairs[]; };
 uniform int count;
 
 void main() {

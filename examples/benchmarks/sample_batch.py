@@ -1,4 +1,4 @@
-"""A batch to measure: small scenes that differ in material and camera, made by the program itself."""
+"""A batch to measure: small scenes that differ in material and camera."""
 
 import subprocess
 import sys

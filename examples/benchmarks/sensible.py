@@ -1,4 +1,4 @@
-"""How high the waves of a ball and of a heavy box get, with a material's old defaults and with those of the model.
+"""Heights of the waves of a ball and of a heavy box: two choices of default material.
 
 python examples/benchmarks/sensible.py MESH (with y up; its longest extent becomes 1 m)
 """
@@ -14,7 +14,8 @@ from ripple_sim import Material, Ripples
 from ripple_sim.solver import load_mesh
 
 BOX = """<mujoco><worldbody><geom name="target" type="box" size="0.5 0.5 0.25"/>
-<body pos="0 0 0.36"><freejoint/><geom type="box" size="0.15 0.15 0.1" mass="20"/></body></worldbody></mujoco>"""
+<body pos="0 0 0.36"><freejoint/><geom type="box" size="0.15 0.15 0.1" mass="20"/></body>
+</worldbody></mujoco>"""
 
 
 def mesh_under_ball(path: str, mass: float) -> mujoco.MjModel:

@@ -1,4 +1,4 @@
-"""What sensors at eight points add to a physics step, and what the sound of the drums takes beside their waves.
+"""Cost of eight sensors in a physics step, and of the sound of the drums.
 
 And what an accelerometer hears of a hit, by MuJoCo's contact and by Hertz's law.
 
@@ -47,7 +47,7 @@ BANDS = (100, 500, 1000, 5000)  # [Hz]
 
 
 def levels(pulse: str) -> list[float]:
-    """Levels of an accelerometer's signal in these bands [dB re 1 m/s^2], of a steel ball on a wooden board."""
+    """Levels of an accelerometer in these bands [dB re 1 m/s^2]: a steel ball on a board."""
     model = mujoco.MjModel.from_xml_string(BOARD)
     data = mujoco.MjData(model)
     board = Material(speed=200.0, density=5.0, damping=100.0)

@@ -21,7 +21,7 @@ MATERIALS = {"speed": (0.15, 0.6), "damping": (0.5, 20.0)}  # black and white: m
 
 
 def half(path: Path) -> None:
-    """Write a picture that is black on one half of the face and white on the other, softly parted: u goes round."""
+    """Write a picture: one half of the face is black, the other white, with a soft border."""
     u = (np.arange(512) + 0.5) / 512
     ramp = np.clip((u - 0.5) / 0.03 + 0.5, 0, 1)
     Image.fromarray(np.broadcast_to(255 * ramp, (256, 512)).astype(np.uint8)).save(path)

@@ -1,4 +1,4 @@
-"""A page of parts: what each shows, its pictures, its figures; as HTML, or as Markdown for the documentation."""
+"""A page of the paper's parts with pictures and figures, as HTML or as Markdown."""
 
 import dataclasses
 import html
@@ -8,7 +8,8 @@ from pathlib import Path
 from PIL import Image
 
 _STYLE = """
-body { font: 16px/1.55 system-ui, sans-serif; color: #1b2432; max-width: 62rem; margin: 2.5rem auto; padding: 0 1rem }
+body { font: 16px/1.55 system-ui, sans-serif; color: #1b2432;
+  max-width: 62rem; margin: 2.5rem auto; padding: 0 1rem }
 h1 { font-size: 2rem; line-height: 1.2 } h2 { margin-top: 3rem }
 figure { margin: 1.2rem 0 } img { max-width: 100%; border-radius: 6px }
 figcaption, code { color: #57606d; font-size: .9em }
@@ -20,7 +21,7 @@ th:first-child, td:first-child { text-align: left }
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """One part of the paper done again: pictures are (file, caption); the first row of a table is its head."""
+    """One part of the paper: pictures are (file, caption); a table's first row is its head."""
 
     title: str
     text: str

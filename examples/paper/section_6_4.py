@@ -47,7 +47,7 @@ def torus(folder: Path) -> Path:
 
 
 def rocker_arm(folder: Path) -> Path:
-    """Write the model of a rocker arm that lies flat, z up: a hub with a bore, and a lever with a knob at its end."""
+    """Write the model of a rocker arm that lies flat, z up: a hub with a bore and a lever."""
     hub = pebble((0.0, 0.0, 0.0), 0.14, 0.1)
 
     def bore(points: np.ndarray) -> np.ndarray:

@@ -107,10 +107,16 @@ class Drawing:
         in_solver = name.startswith("ripple_sim.solver.")
         axes.add_patch(
             FancyBboxPatch(
-                (x, y), WIDTH, HEIGHT, boxstyle="round,pad=0,rounding_size=0.07", linewidth=1.0,
-                facecolor=SOLVER if in_solver else SIDE, edgecolor=INK if in_solver else "#b98b3e", zorder=3,
+                (x, y),
+                WIDTH,
+                HEIGHT,
+                boxstyle="round,pad=0,rounding_size=0.07",
+                linewidth=1.0,
+                facecolor=SOLVER if in_solver else SIDE,
+                edgecolor=INK if in_solver else "#b98b3e",
+                zorder=3,
             )
-        )  # fmt: skip
+        )
         sentence, inside = description(name)
         left = {"ha": "left", "va": "top", "zorder": 4}
         axes.text(
@@ -173,7 +179,7 @@ class Drawing:
         )
 
     def _port(self, node: Node, towards: Node, above: bool) -> float:
-        """Where on its edge a box is left or entered: arrows fan out in the order of their other ends."""
+        """Point on a box's edge where an arrow begins or ends; arrows fan out in order."""
         ends = [
             way[-2] if above else way[1]
             for way in self._layout.ways.values()
@@ -185,7 +191,7 @@ class Drawing:
 
 
 def arrows() -> tuple[dict[str, set[str]], list[tuple[str, str]]]:
-    """Which package imports which, without detours and without what is open to all; and imports that close a circle."""
+    """The direct imports between packages, without open modules, and the imports in a circle."""
     modules = read()
     rooms = {name: room(name) for name in modules if room(name) not in (*COMMON, ENTRY)}
     found = grouped(modules, rooms)

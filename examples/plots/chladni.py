@@ -1,4 +1,4 @@
-"""Chladni's figures: sand on the modes of a free square plate comes to rest where the plate does not move.
+"""Chladni's figures: sand on a vibrating square plate gathers where the plate is at rest.
 
 python examples/plots/chladni.py
 """

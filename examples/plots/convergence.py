@@ -1,4 +1,4 @@
-"""Does a finer atlas give a smaller error? The sphere's mode Y_40 after one period, by each operator.
+"""Error over resolution: the sphere's mode Y_40 after one period, by each operator.
 
     python examples/plots/convergence.py
 

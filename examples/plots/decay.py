@@ -1,4 +1,4 @@
-"""How soon do waves die? Standing waves under damping, under viscosity, and on a viscous layer; modes of a sphere.
+"""Decay of waves: standing waves with damping, viscosity and a viscous layer; a sphere.
 
     python examples/plots/decay.py [--texels 96]
 

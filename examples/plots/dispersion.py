@@ -1,4 +1,4 @@
-"""How fast do waves run? Standing waves on a membrane, a plate, a layer over a core and water, against theory.
+"""Wave speed against theory: standing waves on a membrane, a plate, a layer and water.
 
     python examples/plots/dispersion.py [--texels 96]
 

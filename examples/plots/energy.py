@@ -20,7 +20,7 @@ DAMPINGS = (0.25, 0.5, 1.0)  # 1/s
 
 
 def energies(atlas: Atlas, operator: str, material: Material, times: np.ndarray) -> np.ndarray:
-    """Energy over that at the beginning, at given times [s], after a bump of the height is let go."""
+    """Energy over the initial energy, at given times [s], after the release of a bump."""
     waves = WaveSolver(atlas, material, operator=operator, backend="cpu")
     measure = waves if operator == "fem" else WaveSolver(atlas, material, backend="cpu")
     away = np.linalg.norm(atlas.positions - atlas.mesh.V[0], axis=-1)

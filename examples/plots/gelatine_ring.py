@@ -1,4 +1,4 @@
-"""A ring that a drop sends over gelatine: its leading crest against that of the exact waves, and the measured speed.
+"""The ring of a drop on gelatine: the leading crest against the exact waves.
 
     python examples/plots/gelatine_ring.py [--texels 192]
 
@@ -39,7 +39,7 @@ IMPULSE = 1e-3
 
 
 def spread(name: str, texels: int, times: np.ndarray, short: bool) -> np.ndarray:
-    """Heights over time [s] and distance along a line from where the drop fell, [t, r], r of half the texels."""
+    """Heights over time [s] and distance from the drop, along a line [t, r]."""
     atlas = flat_torus(texels, SIDE)
     waves = WaveSolver(atlas, Material.preset(name, thickness=DEPTH, short=short), backend="cpu")
     place = atlas.positions[0, texels // 2, texels // 2]
@@ -53,7 +53,7 @@ def spread(name: str, texels: int, times: np.ndarray, short: bool) -> np.ndarray
 
 @functools.cache
 def modes() -> np.ndarray:
-    """Wave numbers [1/depth], squared frequencies and masses of the exact mode, widths of the wave numbers; [4, k]."""
+    """The exact mode: wave numbers [1/depth], squared frequencies, masses and widths, [4, k]."""
     q = np.concatenate([np.linspace(1.0, 8.0, 71), np.linspace(8.3, 40.0, 100)])
     return np.array(
         [q, [lowest_square(each) for each in q], [moving_mass(each) for each in q], np.gradient(q)]
@@ -61,7 +61,7 @@ def modes() -> np.ndarray:
 
 
 def exact_ring(modulus: float, distances: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """The same heights [t, r] on an endless layer, of its lowest mode alone: a sum of round waves."""
+    """The heights [t, r] on an endless layer in its lowest mode: a sum of round waves."""
     q, square, mass, width = modes()
     square = square * modulus / DENSITY / DEPTH**2
     across = q * RADIUS / DEPTH
@@ -76,7 +76,7 @@ def exact_ring(modulus: float, distances: np.ndarray, times: np.ndarray) -> np.n
 def leading_crest(
     heights: np.ndarray, distances: np.ndarray, times: np.ndarray, speed: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Times [s] at which the crest that leads the ring passes, and the distances [m] of the ring, [k].
+    """Times [s] of the leading crest and distances [m] of the ring, [k].
 
     It is the greatest height on the side to which the drop pressed, of what runs with 0.84 to 1.1
     of a speed [m/s]: farther out some of what follows is higher, and long low waves run ahead.

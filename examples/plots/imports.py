@@ -1,4 +1,4 @@
-"""Which module of the project imports which, read from the source tree (nothing is imported for it).
+"""Imports between the project's modules, read from the source tree without importing.
 
 Folders stand where they are installed: solver/ is ripple_sim.solver, scenes/ is ripple_sim.scenes.
 An import of a public name, such as `from ripple_sim.solver import Material`, counts as one of the
@@ -17,7 +17,7 @@ FOLDERS = {"ripple_sim": "ripple_sim", "solver": "ripple_sim.solver", "scenes": 
 
 @dataclasses.dataclass(frozen=True)
 class Module:
-    """A Python file: name with dots, place, text, syntax tree, and the names of the project's modules it imports."""
+    """A Python file: module name, path, text, syntax tree, and the project's modules it imports."""
 
     name: str
     path: Path
@@ -65,7 +65,7 @@ def read(root: Path = ROOT) -> dict[str, Module]:
 
 
 def _imported(importer: str, tree: ast.Module) -> list[tuple[str, str, str]]:
-    """Module, name in it, and name given to it, of every import of the project's own, wherever it stands in a file."""
+    """Module, name in it, and local name of every import of the project's own in a file."""
     found = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -92,13 +92,13 @@ def _home(name: str, trees: dict[str, ast.Module], public: dict[str, str]) -> st
 
 
 def room(name: str) -> str:
-    """What a newcomer sees in the folder listing: ripple_sim/coupling/, solver/waves/, ripple_sim/simulation.py."""
+    """Name as in the folder listing: ripple_sim/coupling/, ripple_sim/simulation.py."""
     depth = 3 if name.startswith("ripple_sim.solver.") else 2
     return ".".join(name.split(".")[:depth])
 
 
 def grouped(modules: dict[str, Module], group: dict[str, str]) -> dict[str, set[str]]:
-    """Imports between groups of modules, given the group of each module; a group does not import itself."""
+    """Imports between groups of modules, given each module's group; none within a group."""
     arrows: dict[str, set[str]] = {each: set() for each in group.values()}
     for name, module in modules.items():
         for imported in module.imports:
@@ -108,7 +108,7 @@ def grouped(modules: dict[str, Module], group: dict[str, str]) -> dict[str, set[
 
 
 def cycles(arrows: dict[str, set[str]]) -> list[list[str]]:
-    """Sets of nodes that all reach one another (Tarjan's strongly connected components of more than one node)."""
+    """Sets of nodes that reach one another: Tarjan's strongly connected components."""
     order: dict[str, int] = {}
     low: dict[str, int] = {}
     stack: list[str] = []

@@ -49,14 +49,14 @@ def moving_mass(q: float) -> float:
 
 
 def determinant(q: float, square: float) -> float:
-    """Of the conditions: 0 where a wave of this wave number swings with this square of an angular frequency."""
+    """Residual of the conditions: 0 where a wave number and a squared frequency are a mode."""
     rates, _, rows = conditions(q, square)
     s = rates[2]
     return float((np.linalg.det(rows) / s * np.exp(1j * s.imag)).real)
 
 
 def conditions(q: float, square: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The lowest modes' conditions, in rows: no motion at the base, no shear and no pressure at the surface.
+    """The conditions of the lowest modes: no motion at the base, no stress at the surface.
 
     The normal displacement is a sum of exp(r z - t) with rates r of q and -q, which carry the
     pressure, and of s and -s with s^2 = q^2 - omega^2, which do not; t keeps each within 1. The
@@ -95,7 +95,7 @@ def main() -> None:
 
 
 def three_fields() -> None:
-    """Errors of the surface with two hidden fields, the least local law that has both speeds: fits to them.
+    """Fits of a local law with two hidden fields, the smallest that has both wave speeds.
 
     The faster the hidden waves may run, the closer is the best fit.
     """
@@ -126,7 +126,7 @@ def three_field_frequency(
     slopes: Sequence[float],
     between: float,
 ) -> np.ndarray:
-    """Lowest angular frequency of the surface and two hidden fields that are coupled, of wave numbers [n].
+    """Lowest angular frequency of a surface and two hidden fields, over wave numbers [n].
 
     omega^2 are the eigenvalues of a matrix [3, 3]: squares of the fields' own speeds and
     stiffnesses, surface first. The hidden fields are potentials of what moves along the layer

@@ -33,7 +33,7 @@ def without_detours(arrows: Arrows) -> dict[str, set[str]]:
 
 
 def layers(arrows: Arrows) -> dict[str, int]:
-    """Layer of every node, from 0 at the bottom; then nodes rise while that shortens their arrows."""
+    """Layer of every node from 0 at the bottom; a node rises while its arrows get shorter."""
     level: dict[str, int] = {}
 
     def find(node: str) -> int:
@@ -53,7 +53,7 @@ def layers(arrows: Arrows) -> dict[str, int]:
 
 
 class Layout:
-    """Places of the nodes, [unit widths] across and layers upwards, and the ways of the arrows between them."""
+    """Places of the nodes [unit widths, layers], and the paths of the arrows between them."""
 
     def __init__(
         self, arrows: Arrows, level: Mapping[str, int], passage: float = 0.3, trials: int = 60
@@ -132,7 +132,7 @@ class Layout:
         return x
 
     def _wanted(self, node: Node, x: dict[Node, float]) -> float:
-        """Mean place of a node's neighbours; long arrows pull at their own passages, so that they run straight."""
+        """Mean place of a node's neighbours; long arrows pull at their own passages."""
         near = self._neighbours[node] or [node]
         pull = [
             8.0 if isinstance(node, tuple) and isinstance(each, tuple) else 1.0 for each in near
@@ -146,7 +146,7 @@ class Layout:
 
 
 def _increasing(wanted: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The nearest sequence, by weighted least squares, that never decreases (pooled adjacent violators)."""
+    """The nearest sequence that never decreases, by least squares (pooled adjacent violators)."""
     pools: list[tuple[float, float, int]] = []  # mean, weight, length
     for value, weight in zip(wanted, weights, strict=True):
         pools.append((value, weight, 1))

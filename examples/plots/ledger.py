@@ -1,4 +1,4 @@
-"""Where does the energy of a bouncing ball go? Bodies, waves and both, with one-way and with two-way coupling.
+"""The energy of a bouncing ball: bodies, waves and both; one-way and two-way coupling.
 
     python examples/plots/ledger.py
 
@@ -18,9 +18,11 @@ from ripple_sim import Material, Ripples
 FALL = 0.24
 DURATION = 2.0
 CURVES = {"bodies": COLORS["paper"], "waves": COLORS["fem"], "total": TEXT}
-SCENE = f"""<mujoco><option timestep="0.0005"/><default><geom solref="-20000 0"/></default><worldbody>
+SCENE = f"""<mujoco><option timestep="0.0005"/><default><geom solref="-20000 0"/></default>
+<worldbody>
 <geom name="block" type="box" size="0.5 0.5 0.1" pos="0 0 -0.1"/>
-<body pos="0.03 0.02 {0.06 + FALL}"><freejoint/><geom size="0.06" mass="0.5"/></body></worldbody></mujoco>"""
+<body pos="0.03 0.02 {0.06 + FALL}"><freejoint/><geom size="0.06" mass="0.5"/></body></worldbody>
+</mujoco>"""
 
 
 def ledger(*, two_way: bool) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -1,4 +1,4 @@
-"""One ball on forehead, cheek and nose tip of a head with a skull: the height of the skin where it was struck.
+"""A ball on forehead, cheek and nose of a head with a skull: height of the skin there.
 
     python examples/plots/skull.py [--resolution 96]
 
@@ -45,7 +45,7 @@ def from_scan(scene: Scene, folder: Path) -> Scene:
 
 
 def curves(scene: Scene, resolution: int) -> dict[str, tuple[float, np.ndarray]]:
-    """Thickness [m] where each ball first strikes, and the heights there [m] from the frame before on."""
+    """Thickness [m] where each ball hits first, and the heights there [m] from then on."""
     simulation = Simulation(scene, fps=FPS, resolution=resolution, backend="cpu")
     heights = []
     struck = {}

@@ -21,7 +21,7 @@ def flat_torus(n: int, side: float = 1.0) -> Atlas:
 def swung(
     atlas: Atlas, material: Material, wave: np.ndarray, rough: float, periods: float = 1.5
 ) -> tuple[float, float]:
-    """Frequency and decay rate [1/s] of a standing wave [C, n, n] whose frequency is known roughly [1/s]."""
+    """Frequency and decay rate [1/s] of a standing wave [C, n, n], near a known frequency [1/s]."""
     waves = WaveSolver(atlas, material, backend="cpu")
     waves.height = wave
     dt = PERIODS * 2 * np.pi / rough / STEPS
@@ -39,6 +39,6 @@ def swung(
 
 
 def plane_wave(atlas: Atlas, material: Material, q: float) -> tuple[float, float]:
-    """Frequency and decay rate [1/s] of a standing plane wave of a wave number [1/m] on a flat torus."""
+    """Frequency and decay rate [1/s] of a plane wave on a flat torus; wave number in 1/m."""
     rough = max(frequency(material, q), 0.1 / decay_time(material, q))
     return swung(atlas, material, np.cos(q * atlas.positions[..., 0]), rough)

@@ -24,12 +24,14 @@ TRACE = """
 import json, sys
 import mujoco
 from ripple_sim import Material, Ripples
-model = mujoco.MjModel.from_xml_string('''<mujoco><visual><global offwidth="160" offheight="90"/></visual><worldbody>
+model = mujoco.MjModel.from_xml_string('''<mujoco><visual><global offwidth="160" offheight="90"/>
+</visual><worldbody>
   <light pos="1 1 3" dir="-.3 -.3 -1"/><geom name="floor" type="plane" size="2 2 1"/>
   <geom name="target" size="0.3" pos="0 0 0.3"/>
   <body pos="0.02 0 0.655"><freejoint/><geom size="0.06"/></body></worldbody></mujoco>''')
 data = mujoco.MjData(model)
-ripples = Ripples(model, {"target": Material(speed=0.6, damping=1.0, density=600.0)}, resolution=8, backend="cpu")
+material = Material(speed=0.6, damping=1.0, density=600.0)
+ripples = Ripples(model, {"target": material}, resolution=8, backend="cpu")
 seen = {}
 def trace(frame, event, argument):
     if event == "call":

@@ -1,4 +1,4 @@
-"""Do wave fronts follow the geodesic circles? Iso-lines of when a bump's wave arrives, over the surface.
+"""Wave fronts against geodesic circles: lines of equal arrival time on the surface.
 
     python examples/plots/wave_fronts.py [MESH] [--resolution 96] [--up y|z]
 
@@ -41,7 +41,7 @@ INK = np.array([0.07, 0.09, 0.14])
 
 
 class FrontPainter(AtlasPainter):
-    """Paints the fronts: fields on the texels of the distance that they should have gone, and that they have gone."""
+    """Draws the fronts: fields on the texels of the exact and of the measured distance."""
 
     def __init__(
         self, atlas: Atlas, distance: np.ndarray, gone: np.ndarray, spacing: float, nearest: float
@@ -66,7 +66,7 @@ class FrontPainter(AtlasPainter):
 
 
 def fields(atlas: Atlas, source: int, operator: str) -> tuple[np.ndarray, np.ndarray]:
-    """Exact geodesic distance of the texels from a vertex, and the distance that the wave's front had gone."""
+    """Exact geodesic distance of the texels from a vertex, and the distance of the front."""
     mesh = atlas.mesh
     exact = geodesic_distance(mesh, source)
     # NaN on other parts of the mesh, where no front ever comes and none is expected: they are

@@ -55,7 +55,7 @@ def arm(circles: int = 48, sides: int = 24) -> tuple[Array, Triangles]:
 
 
 def write_skin(path: Path, V: Array, F: Triangles) -> None:
-    """Write MuJoCo's binary skin format, with the bones "upper" and "lower", of which the latter hangs at the elbow."""
+    """Write MuJoCo's skin format with the bones "upper" and "lower"; "lower" is at the elbow."""
     lower = np.clip((-V[:, 2] - ELBOW + _BEND) / (2 * _BEND), 0, 1)
     content = (
         struct.pack("<4i", len(V), 0, len(F), 2)

@@ -44,7 +44,7 @@ def skin(circles: int = 24) -> tuple[Array, Triangles]:
 
 
 def wall(segments: int = 72) -> tuple[Array, Triangles]:
-    """Tube that bulges a little, with a hoop round its upper end: closed, of genus 1; V and F as of `skin`."""
+    """Bulging tube with a hoop round its upper end: closed, of genus 1; V and F as of `skin`."""
     angle = np.linspace(0, 2 * np.pi, 17)[:-1]
     hoop = np.stack([RADIUS + _HOOP * np.cos(angle), HEIGHT + _HOOP * np.sin(angle)], axis=1)
     t = np.linspace(1, 0, 13)[1:]

@@ -81,7 +81,7 @@ _LIPS = smooth_union(
 
 
 def head(cell: float = 0.017) -> tuple[Array, NDArray[np.int64]]:
-    """Model a head 0.75 m high that faces +x and stands on z = 0, vertices and triangles as `polygonise` gives them."""
+    """Model a head 0.75 m high that faces +x and stands on z = 0; see `polygonise`."""
     V, F = polygonise(head_solid(), ((-0.4, -0.4, 0.1), (0.45, 0.4, 0.95)), cell)
     return V - [0.0, 0.0, FOOT], F
 
@@ -133,7 +133,7 @@ def write_images(colors: Path, waves: Path) -> None:
 
 
 def _coordinates(points: Array) -> Array:
-    """Texture coordinates [..., 2] of points [..., 3]: longitude, with the face in the middle, and latitude."""
+    """Texture coordinates [..., 2] of points [..., 3]: longitude from the face, and latitude."""
     x, y, z = np.moveaxis(points - _MIDDLE, -1, 0)
     return np.stack(
         [0.5 + np.arctan2(y, x) / (2 * np.pi), 0.5 + np.arctan2(z, np.hypot(x, y)) / np.pi], axis=-1
@@ -141,7 +141,7 @@ def _coordinates(points: Array) -> Array:
 
 
 def _painted_points() -> Array:
-    """Outermost points of the head that an image's pixels stand for, [height, width, 3], top row first."""
+    """Outermost points of the head at the pixels of an image, [height, width, 3], top row first."""
     height = _FINER * _HEIGHT
     width = 2 * _FINER * _HEIGHT
     latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)[:, None]
@@ -184,7 +184,7 @@ def _is_eye(points: Array) -> NDArray[np.bool_]:
 
 
 def skull(cell: float = 0.02) -> tuple[Array, NDArray[np.int64]]:
-    """Model the skull in the head, in its frame: close under the forehead, deep under cheeks and nose."""
+    """Model the skull in the head's frame: close under the forehead, deep under the cheeks."""
     V, F = polygonise(_skull_solid(), (LOW, HIGH), cell)
     return V - [0.0, 0.0, FOOT], F
 
@@ -206,9 +206,9 @@ def _skull_solid() -> Sdf:
 
 
 def head_volume(spacing: float = 0.01, seed: int = 0) -> tuple[NDArray[np.int16], Array]:
-    """Scan the head: voxels [i, j, k] along x, y and z [Hounsfield units], and where the first one is [m].
+    """Scan the head: voxels [i, j, k] along x, y and z [Hounsfield units], and their origin.
 
-    The scanner blurs over a voxel and is noisy.
+    The origin is the place of the first voxel [m]. The scanner blurs over a voxel and is noisy.
     """
     counts = np.ceil((HIGH - LOW) / spacing).astype(int) + 1
     nodes = np.moveaxis(np.indices(tuple(counts)), 0, -1).reshape(-1, 3) * spacing + LOW

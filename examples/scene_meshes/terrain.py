@@ -22,7 +22,10 @@ _HILLS = (
 
 
 def terrain(size: int = 64) -> Array:
-    """Heights [size, size], 0 to 1: four hills round a valley; rows go along y, columns along x, both from -1 to 1."""
+    """Heights [size, size], 0 to 1: four hills round a valley.
+
+    Rows go along y and columns along x, both from -1 to 1.
+    """
     x, y = np.meshgrid(*[np.linspace(-1, 1, size)] * 2)
     height = 0.25 * (x * x + y * y) + 0.04 * np.sin(5 * x + 1) * np.cos(4 * y)
     for east, north, width, top in _HILLS:
@@ -31,7 +34,7 @@ def terrain(size: int = 64) -> Array:
 
 
 def write(path: Path = TERRAIN_FILE) -> None:
-    """Write rows and columns as int32, then the heights as float32: MuJoCo's own format of height fields."""
+    """Write MuJoCo's format of height fields: rows and columns as int32, heights as float32."""
     heights = terrain()
     path.write_bytes(np.array(heights.shape, "<i4").tobytes() + heights.astype("<f4").tobytes())
 

@@ -38,7 +38,9 @@ _POUR = (0.75, 0.0, 0.66)
 
 
 def teapot(cell: float = 0.02) -> tuple[Array, Triangles]:
-    """Model a teapot 1 m long, with a handle, open at the top and at the spout's tip, and a lid that lies on it.
+    """Model a teapot 1 m long with a handle, two openings and a lid.
+
+    It is open at the top and at the tip of the spout; the lid lies on it.
 
     Parameters
     ----------
@@ -93,7 +95,7 @@ def teapot(cell: float = 0.02) -> tuple[Array, Triangles]:
 
 
 def pretzel(cell: float = 0.02) -> tuple[Array, Triangles]:
-    """Model a pretzel 1 m wide that lies on z = 0: a closed surface with three handles; cell as for `teapot`."""
+    """Model a pretzel 1 m wide on z = 0, a closed surface of genus 3; cell as for `teapot`."""
     course = [
         (0.13, -0.30),
         (0.07, -0.17),
@@ -113,7 +115,7 @@ def pretzel(cell: float = 0.02) -> tuple[Array, Triangles]:
 def tube(
     course: ArrayLike, radius: float, last_radius: float | None = None, segments: int = 40
 ) -> Sdf:
-    """Round tube along a smooth curve through points [k, 3] [m], whose radius [m] changes evenly to that at its end."""
+    """Round tube along a smooth curve through points [k, 3] [m]; the radius changes evenly [m]."""
     points = np.asarray(course, dtype=np.float64)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     curve = CubicSpline(along, points)(np.linspace(0.0, along[-1], segments + 1))
@@ -128,10 +130,10 @@ def tube(
 def opened(
     sdf: Sdf, V: Array, F: Triangles, point: ArrayLike, normal: ArrayLike, cell: float
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Cut a triangulated surface sdf = 0 open: what lies beyond a plane through a point [m] along a normal is left out.
+    """Cut the surface sdf = 0 open: leave out what lies beyond a plane.
 
-    Vertices near the plane are moved onto its cut with the surface first, so that no slivers come
-    about.
+    The plane has a point [m] and a normal. Vertices near the plane are first moved onto the curve
+    where it cuts the surface, so that no slivers arise.
     """
     point = np.asarray(point, dtype=np.float64)
     normal = np.asarray(normal, dtype=np.float64)
@@ -152,7 +154,7 @@ def opened(
 
 
 def _clipped(V: Array, F: Triangles, beyond: Array) -> tuple[Array, Triangles]:
-    """Part of a triangulation where a function, linear in its triangles and given at the vertices [n], is negative."""
+    """Part of a triangulation where a linear function, given at the vertices [n], is negative."""
     count = (beyond[F] > 0).sum(axis=1)
     crossing = F[(count > 0) & (beyond[F].min(axis=1) < 0)]
     turn = np.where(

@@ -60,8 +60,8 @@ class DaskExecutor(Executor):
             self._client = Client(address, timeout=20, set_as_default=False)
         except (OSError, ValueError) as error:
             raise BatchError(
-                f"no Dask scheduler answers at {shown(address)} ({error}); valid is an address "
-                "such as tcp://host:8786"
+                f"no Dask scheduler answers at {shown(address)} ({error}): give an address such "
+                "as tcp://host:8786"
             ) from error
         self._address = address
         self._log = logging.getLogger("distributed.client")

@@ -120,8 +120,8 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
         given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
         if len(given) != 1:
             raise SceneError(
-                f"plan: {key} is drawn from {' and '.join(given) or 'nothing'}; valid is one of "
-                f"{', '.join(KINDS)}"
+                f"plan: {key} must be drawn from one of {', '.join(KINDS)}, got "
+                f"{' and '.join(given) or 'nothing'}"
             )
         kind = given[0]
         for other, extra, fitting in (
@@ -132,7 +132,8 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
                 raise SceneError(f"plan: {key} has {other}, which {kind} does not take")
         if self.length is not None and (self.length < 1 or kind not in KINDS[:4]):
             raise SceneError(
-                f"plan: {key} has length {self.length}; valid is 1 or more, of numbers"
+                f"plan: the length of {key} must be 1 or more, and its values numbers, got "
+                f"length {self.length}"
             )
         problem = self._problem()
         if problem:
@@ -147,25 +148,25 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
             low = np.array(pair[0], float)
             high = np.array(pair[1], float)
             if low.shape not in ((), high.shape) and high.shape != ():
-                return "valid are two numbers, or two vectors of the same length"
+                return "it must be two numbers, or two vectors of the same length"
             if not (np.isfinite(low).all() and np.isfinite(high).all() and np.all(low <= high)):
-                return "valid are two finite numbers, the lower one first"
+                return "it must be two finite numbers, the lower one first"
             if self.log_uniform and np.any(low <= 0):
-                return "valid are numbers above 0"
+                return "its numbers must be above 0"
             if self.length is not None and max(low.size, high.size) > 1:
                 return "vectors have their own length; leave `length` out"
         if self.normal is not None and not (np.isfinite(self.normal).all() and self.normal[1] >= 0):
-            return "valid are a mean and a standard deviation of 0 or more"
+            return "it must be a mean and a standard deviation of 0 or more"
         if self.choice is not None:
             if not self.choice:
-                return "valid is at least one value"
+                return "it must have at least one value"
             weights = self.weights
             if weights is not None and not (
                 len(weights) == len(self.choice)
                 and min(weights) >= 0
                 and 0 < sum(weights) < math.inf
             ):
-                return f"valid are {len(self.choice)} weights, none below 0"
+                return f"it must have {len(self.choice)} weights, none below 0"
         return None
 
 
@@ -185,9 +186,9 @@ def parse_key(key: str) -> tuple[Step, ...]:
     """Read a key of a plan; raises `SceneError` if it is not names between dots."""
     if not re.fullmatch(rf"{_STEP_PATTERN}(?:\.{_STEP_PATTERN})*", key):
         raise SceneError(
-            f"plan: {key!r} is not a key; valid are names between dots, with a number, a name or "
-            "a pattern in brackets, such as camera.azimuth, ripple[duck].material.speed or "
-            "geom[ball*].size"
+            "plan: a key must be names between dots, with a number, a name or a pattern in "
+            "brackets, such as camera.azimuth, ripple[duck].material.speed or geom[ball*].size, "
+            f"got {key!r}"
         )
     return tuple(re.findall(_STEP_PATTERN, key))
 
@@ -216,7 +217,8 @@ class StoreEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[store]`: what is kept of each scene."""
 
     video: Literal["mp4", "webm", "gif", "webp", "png", "exr", "none"] = "mp4"
-    """`mp4`, `webm`, `gif`, `webp`; `png` or `exr`: a folder of frames; `none`: nothing is drawn."""
+    """`mp4`, `webm`, `gif`, `webp`; `png` or `exr`: a folder of frames; `none`: nothing is
+    drawn."""
     size: tuple[int, int] = (256, 256)
     """Of the frames [pixels]."""
     fps: int = 24
@@ -363,7 +365,7 @@ def check_plan(plan: Plan) -> None:
     ):
         if not least <= value <= most:
             raise SceneError(
-                f"plan: {name} is {value}; valid is a whole number from {least} to {most}"
+                f"plan: {name} must be a whole number from {least} to {most}, got {value}"
             )
     if not plan.sources:
         raise SceneError(
@@ -392,7 +394,8 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
     shipped = shipped_scenes()
     for name in content.scenes:
         path = folder / name
-        if name not in shipped and not os.path.isfile(path):  # noqa: PTH113 - False for what can be no name, too
+        # os.path.isfile returns False for a string that cannot be a path; Path.is_file raises
+        if name not in shipped and not os.path.isfile(path):  # noqa: PTH113
             raise SceneError(
                 f"plan: there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, "
                 "or give the path of a TOML file, relative to the plan"
@@ -407,8 +410,8 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
         found += [file for file in within if file.suffix[1:].lower() in trimesh.available_formats()]
         if not found:
             raise SceneError(
-                f"plan: no mesh fits {pattern!r}; valid is a file, a folder or a pattern, "
-                "relative to the plan"
+                f"plan: no mesh fits {pattern!r}: give a file, a folder or a pattern, relative "
+                "to the plan"
             )
         yield from map(str, found)
 

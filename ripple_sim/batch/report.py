@@ -23,8 +23,9 @@ _MOST = 5_000  # scenes on the page
 _HEAD = """<!doctype html><meta charset="utf-8"><title>{name}</title><style>
 body{{font:15px system-ui,sans-serif;margin:2rem;color:#222;background:#fafafa}}
 main{{display:grid;grid-template-columns:repeat(auto-fill,minmax(170px,1fr));gap:12px}}
-a{{display:block;background:#fff;border-radius:6px;padding:5px;color:inherit;text-decoration:none;font-size:12px;
-box-shadow:0 1px 3px #0003}}img{{width:100%;display:block;border-radius:3px}}.failed{{background:#fdd}}
+a{{display:block;background:#fff;border-radius:6px;padding:5px;color:inherit;text-decoration:none;
+font-size:12px;box-shadow:0 1px 3px #0003}}
+img{{width:100%;display:block;border-radius:3px}}.failed{{background:#fdd}}
 </style><h1>{name}</h1><p>{summary}</p><main>
 """
 

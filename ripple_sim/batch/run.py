@@ -52,7 +52,8 @@ class RunOptions:
     """How a batch is run; none of it changes a byte of the scenes."""
 
     workers: int | None = None
-    """Processes of this machine; by default one for every two cores, at least two where there are two."""
+    """Processes of this machine; by default one for every two cores, at least two where there are
+    two."""
     shard: tuple[int, int] = (1, 1)
     """Which part of the scenes to make, of how many."""
     limit: int | None = None
@@ -167,7 +168,9 @@ class BatchRun:
             number = self.pending.popleft()
             self._running.add(number)
             future = executor.submit(work, str(self.batch.path), number)
-            future.add_done_callback(lambda future, number=number: self._done.put((number, future)))  # type: ignore[misc]
+            future.add_done_callback(
+                lambda future, number=number: self._done.put((number, future))  # type: ignore[misc]
+            )
 
     def _take(self, number: int, outcome: Outcome) -> None:
         if outcome.state == "busy":

@@ -31,9 +31,18 @@ _NAME_KEYS = ("geom", "body", "actuator")
 
 # Tags of elements in an MJCF, and the attribute of `MjSpec` that lists them.
 ELEMENTS = {
-    "body": "bodies", "geom": "geoms", "joint": "joints", "site": "sites", "camera": "cameras", "light": "lights",
-    "material": "materials", "texture": "textures", "mesh": "meshes", "tendon": "tendons", "actuator": "actuators",
-}  # fmt: skip
+    "body": "bodies",
+    "geom": "geoms",
+    "joint": "joints",
+    "site": "sites",
+    "camera": "cameras",
+    "light": "lights",
+    "material": "materials",
+    "texture": "textures",
+    "mesh": "meshes",
+    "tendon": "tendons",
+    "actuator": "actuators",
+}
 
 # parts of a specification that have attributes but no elements
 _MODEL_GROUPS = ("option", "visual")
@@ -157,8 +166,8 @@ def _attributes(spec: mujoco.MjSpec, key: str) -> Iterator[tuple[Any, str, int |
     kind, _ = first
     if not steps or kind not in (*ELEMENTS, *_MODEL_GROUPS):
         raise SceneError(
-            f"plan: {key!r} is no attribute of a model; valid are an element and its attribute, "
-            f"such as geom[ball].size, of {', '.join((*ELEMENTS, *_MODEL_GROUPS))}"
+            f"plan: {key!r} is no attribute of a model: name an element and its attribute, such "
+            f"as geom[ball].size, of {', '.join((*ELEMENTS, *_MODEL_GROUPS))}"
         )
     if kind in _MODEL_GROUPS:
         found = [(getattr(spec, kind), kind)]
@@ -180,7 +189,10 @@ def _attributes(spec: mujoco.MjSpec, key: str) -> Iterator[tuple[Any, str, int |
 def _inner(element: Any, attribute: str, key: str) -> Any:
     if not hasattr(element, attribute):
         valid = ", ".join(name for name in dir(element) if not name.startswith("_"))
-        raise SceneError(f"plan: {key!r} names the attribute {attribute!r}; valid are {valid}")
+        raise SceneError(
+            f"plan: {key!r} names the attribute {attribute!r}, which does not exist; attributes "
+            f"are {valid}"
+        )
     return getattr(element, attribute)
 
 

@@ -61,7 +61,8 @@ def write_thumbnail(scene: FinishedScene, frames: int, output: Path) -> None:
     """
     middle = None
     with contextlib.suppress(BatchError):
-        for middle in itertools.islice(scene.frames(), frames // 2 + 1):  # noqa: B007 - the last one counts
+        # the loop ends at the frame in the middle
+        for middle in itertools.islice(scene.frames(), frames // 2 + 1):  # noqa: B007
             pass
     if middle is not None:
         image = Image.fromarray(middle)

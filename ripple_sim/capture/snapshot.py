@@ -189,8 +189,8 @@ class ShownWaves:
                 warn_caller(
                     f"no wave on {name!r} was higher than a pixel: {peak:.2g} m at most, where a "
                     f"pixel is {pixel:.2g} m"
-                    f" wide. A density {factor:.2g} times lower{lower} would show {_VISIBLE_HEIGHT:g} "
-                    f"pixels; so may "
+                    f" wide. A density {factor:.2g} times lower{lower} would show "
+                    f"{_VISIBLE_HEIGHT:g} pixels; so may "
                     'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in '
                     "Python"
                 )

@@ -27,7 +27,7 @@ def parse_size(word: str) -> tuple[int, int]:
     match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", word)
     if match is None:
         raise ValueError(
-            f"{shown(word)} is not a frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720"
+            f"frame size must be WIDTHxHEIGHT in pixels, such as 1280x720, got {shown(word)}"
         )
     return int(match[1]), int(match[2])
 
@@ -45,7 +45,7 @@ def _reader(
             value = read(word)
             if right(value):
                 return value
-        raise ValueError(f"{shown(word)} is not valid; it must be {valid}")
+        raise ValueError(f"it must be {valid}, got {shown(word)}")
 
     return parse
 
@@ -106,8 +106,7 @@ def parse_material(word: str) -> tuple[str, dict[str, float]]:
     with contextlib.suppress(ValueError, TypeError):
         return name, {match[1]: float(match[2]) for match in found}  # type: ignore[index]
     raise ValueError(
-        f"{shown(word)} is not valid; it must be a name, as steel-plate, or "
-        "steel-plate,thickness=0.002"
+        f"it must be a name, such as steel-plate, or steel-plate,thickness=0.002, got {shown(word)}"
     )
 
 

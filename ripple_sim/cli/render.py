@@ -75,11 +75,12 @@ class ExportCommand(_SceneCommand, ExportOptions):
     triangles: arguments.Count = ExportOptions.triangles
     chunk: arguments.Limit = ExportOptions.chunk
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
-    """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...). Bodies drop on a
-    mesh."""
+    """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB
+    ...). Bodies drop on a mesh."""
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
-    """Output file. Its ending chooses the format: .usdc, .usda or .usdz (the moving scene), .html (a player), .zarr
-    (fields over time), .csv or .parquet (impulses, or signals), .wav (signals, or sound)."""
+    """Output file. Its ending chooses the format: .usdc, .usda or .usdz (the moving scene), .html
+    (a player), .zarr (fields over time), .csv or .parquet (impulses, or signals), .wav (signals, or
+    sound)."""
     seed: arguments.SceneSeed = None
     """Seed of the scene's random variation, or of the bodies that drop on a mesh."""
 
@@ -195,7 +196,8 @@ class _VideoCommand(_SceneCommand, VideoOptions):
     """Output file: .mp4, .webm, .gif or .webp, or a name without an ending for a folder of frames."""
     device: arguments.Device = VideoOptions.device
     renderer: Literal["gl", "cycles"] = "gl"
-    """gl is the OpenGL renderer. cycles is Blender's path tracer (needs bpy), at seconds to minutes a frame."""
+    """gl is the OpenGL renderer. cycles is Blender's path tracer (needs bpy), at seconds to minutes
+    a frame."""
     samples: arguments.Count = 64
     """Paths per pixel, for Cycles."""
 
@@ -303,13 +305,16 @@ class DropCommand(_VideoCommand):
     seed: arguments.Seed = 0
     """Seed of the places and sizes of the bodies. The same seed gives the same video."""
     up: arguments.UpAxis = None
-    """Axis of the mesh that points up. By default a flat sheet lies down, and an unstable mesh is turned upright."""
+    """Axis of the mesh that points up. By default a flat sheet lies down, and an unstable mesh is
+    turned upright."""
     texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
-    """Image for the texture coordinates of the mesh. By default the image that the file names, or NAME_texture.png."""
+    """Image for the texture coordinates of the mesh. By default the image that the file names, or
+    NAME_texture.png."""
     repair: bool = False
     """Close the holes of the mesh (needs the package pymeshfix)."""
     wrap: bool = False
-    """Replace the mesh by a closed surface around it: for parts that intersect, or scans in pieces."""
+    """Replace the mesh by a closed surface around it: for parts that intersect, or scans in
+    pieces."""
 
     def check_input(self) -> None:
         """Check that the mesh exists."""
@@ -346,7 +351,8 @@ class ViewCommand:
     """
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
-    """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...)."""
+    """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB
+    ...)."""
     size: arguments.Size = (800, 600)
     """Window size in pixels."""
     resolution: arguments.Count = 64
@@ -356,19 +362,23 @@ class ViewCommand:
     seed: arguments.Seed = 0
     """Seed of the places and sizes of the bodies."""
     up: arguments.UpAxis = None
-    """Axis of the mesh that points up. By default a flat sheet lies down, and an unstable mesh is turned upright."""
+    """Axis of the mesh that points up. By default a flat sheet lies down, and an unstable mesh is
+    turned upright."""
     repair: bool = False
     """Close the holes of the mesh (needs the package pymeshfix)."""
     wrap: bool = False
-    """Replace the mesh by a closed surface around it: for parts that intersect, or scans in pieces."""
+    """Replace the mesh by a closed surface around it: for parts that intersect, or scans in
+    pieces."""
     folder: Annotated[Path, arg(metavar="FOLDER")] = Path()
     """Folder for screenshots and videos."""
     web: bool = False
-    """Serve a web page for a browser instead of opening a window (needs the extra ripple-sim[web])."""
+    """Serve a web page for a browser instead of opening a window (needs the extra
+    ripple-sim[web])."""
     port: arguments.Count = 8080
     """Port of the web page."""
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
-    """Address of the web page. Any address but 127.0.0.1 lets other machines see and control the viewer."""
+    """Address of the web page. Any address but 127.0.0.1 lets other machines see and control the
+    viewer."""
     benchmark: bool = False
     """Measure the update rate of the window, print it, and exit."""
 

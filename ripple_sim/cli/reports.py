@@ -143,7 +143,8 @@ class BatchCommand:
     shard: Shard = None
     """Make only part I of N of the scenes, to share a batch among machines."""
     dask: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="(optional)")] = None
-    """Address of a Dask scheduler (needs Dask). Its workers make the scenes, and must see the same folder."""
+    """Address of a Dask scheduler (needs Dask). Its workers make the scenes, and must see the same
+    folder."""
     limit: Limit = None
     """Largest number of scenes to make in this run."""
     keep_free: Gigabytes = 1.0
@@ -153,7 +154,8 @@ class BatchCommand:
     retry_failed: bool = False
     """Try again the scenes that were put aside after repeated failures."""
     dry_run: bool = False
-    """Make one scene as a trial, and print the values of the first scenes and the time and room for all."""
+    """Make one scene as a trial, and print the values of the first scenes and the time and room for
+    all."""
 
     def run(self) -> None:
         """Make the batch, or print its status or the result of a trial."""

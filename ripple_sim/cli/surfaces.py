@@ -54,16 +54,17 @@ class AtlasCommand:
     resolution: Count = 128
     """Texels along the edge of a cube's chart, N. Every layout has about 6 N^2 texels in all."""
     layout: LayoutName = "auto"
-    """Layout of the charts: cube (for a closed mesh in one part without handles), patches (any mesh), or auto, which
-    takes the cube for round bodies."""
+    """Layout of the charts: cube (for a closed mesh in one part without handles), patches (any
+    mesh), or auto, which takes the cube for round bodies."""
     method: Annotated[str, arg(metavar="{progressive,conformal}")] = "progressive"
-    """Sphere map of the cube layout: progressive (even areas, no folds) or conformal (keeps angles, but gives limbs
-    few texels)."""
+    """Sphere map of the cube layout: progressive (even areas, no folds) or conformal (keeps angles,
+    but gives limbs few texels)."""
     plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None
-    """Write an image of the mesh and its charts, coloured by stretch, or with --inside by thickness."""
+    """Write an image of the mesh and its charts, coloured by stretch, or with --inside by
+    thickness."""
     inside: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
-    """Report the thickness of the layer between the mesh and this one inside it, or this volume (NIfTI, NRRD, DICOM
-    folder, .npy)."""
+    """Report the thickness of the layer between the mesh and this one inside it, or this volume
+    (NIfTI, NRRD, DICOM folder, .npy)."""
     threshold: Annotated[float | None, arg(metavar="VALUE", help_behavior_hint="(optional)")] = None
     """Value at the surface of the object in the volume."""
     spacing: Annotated[float | None, arg(metavar="M", help_behavior_hint="(optional)")] = None
@@ -73,7 +74,8 @@ class AtlasCommand:
     repair: bool = False
     """Close the holes of the mesh (needs the package pymeshfix)."""
     wrap: bool = False
-    """Replace the mesh by a closed surface around it: for parts that intersect, or scans in pieces."""
+    """Replace the mesh by a closed surface around it: for parts that intersect, or scans in
+    pieces."""
     json: bool = False
     """Print JSON."""
     overwrite: bool = False
@@ -167,9 +169,9 @@ def atlas_report(
     """Figures of an atlas, as JSON can hold them.
 
     The mesh has a `size` (of its bounding box [m]), an `area` [m^2], a `volume` [m^3], and `notes`
-    on its repairs and on the choice of its layout. The atlas has `charts` (C, n, n), the `method` of
-    the cube's sphere map, and a `quality` (see `Atlas.quality`). `thickness` has quantiles of the
-    thickness of a layer [m], and `seconds` the wall time of each stage [s].
+    on its repairs and on the choice of its layout. The atlas has `charts` (C, n, n), the `method`
+    of the cube's sphere map, and a `quality` (see `Atlas.quality`). `thickness` has quantiles of
+    the thickness of a layer [m], and `seconds` the wall time of each stage [s].
     """
     mesh = atlas.mesh
     known: dict[str, Any] = {}
@@ -238,15 +240,15 @@ class ModesCommand:
     mesh: Annotated[Positional[Path], arg(metavar="MESH")]
     """Mesh file (OBJ, OFF, PLY, STL, GLB ...), in metres."""
     material: NamedMaterial
-    """A preset from `ripple-sim materials`, or membrane, layer, jelly, plate or water. Parameters may follow, as in
-    steel-plate,thickness=0.002."""
+    """A preset from `ripple-sim materials`, or membrane, layer, jelly, plate or water. Parameters
+    may follow, as in steel-plate,thickness=0.002."""
     count: Annotated[Count, arg(aliases=["-n"])] = 20
     """Number of modes, from the lowest frequency up."""
     resolution: Count = 64
     """Texels along the edge of a cube's chart, N. Every layout has about 6 N^2 texels in all."""
     layout: LayoutName = "auto"
-    """Layout of the charts: cube (for a closed mesh in one part without handles), patches (any mesh), or auto, which
-    takes the cube for round bodies."""
+    """Layout of the charts: cube (for a closed mesh in one part without handles), patches (any
+    mesh), or auto, which takes the cube for round bodies."""
     rim: RimName = "free"
     """Rim of an open mesh: free, fixed (a drum's skin), supported or clamped (a plate)."""
     plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None

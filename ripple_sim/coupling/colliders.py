@@ -120,7 +120,7 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
     """
     if route not in ROUTES:
         raise SceneError(
-            f"collision route {route!r} is not known; valid are {', '.join(map(repr, ROUTES))}"
+            f"collision route must be one of {', '.join(map(repr, ROUTES))}, got {route!r}"
         )
     found = _find(spec, geom)
     is_mesh = bool(found.meshname)
@@ -184,8 +184,8 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
     """
     if not mesh.closed:
         raise SceneError(
-            f"the {mesh.name} is open and encloses no volume that has convex parts; valid routes "
-            "for it are 'flex' and 'hull'"
+            f"the {mesh.name} is open and encloses no volume that has convex parts; its routes "
+            "are 'flex' and 'hull'"
         )
     try:
         version = importlib.metadata.version("coacd")

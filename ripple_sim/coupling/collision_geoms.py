@@ -30,7 +30,7 @@ def named_collision_geoms(
     """
     if not isinstance(contacts, Mapping):
         raise SceneError(
-            f"contacts is {contacts!r}; valid is a mapping of rippling geoms to lists of geoms"
+            f"contacts must be a mapping of rippling geoms to lists of geoms, got {contacts!r}"
         )
     rippling: dict[TargetId, str] = {find_any(model, name): name for name in targets}
     solids_by_target: dict[GeomId, tuple[GeomId, ...]] = {}
@@ -48,7 +48,7 @@ def named_collision_geoms(
                 f"{', '.join(map(repr, rippling.values())) or 'none'}"
             )
         if isinstance(keys, str) or not isinstance(keys, Iterable):
-            raise SceneError(f"contacts of geom {name!r} is {keys!r}; valid is a list of geoms")
+            raise SceneError(f"contacts of geom {name!r} must be a list of geoms, got {keys!r}")
         solids = tuple(dict.fromkeys(find_geom(model, key) for key in keys))
         for geom in solids:
             _check_named(model, target, name, geom)
@@ -69,8 +69,8 @@ def _check_named(model: mujoco.MjModel, target: GeomId, name: str, geom: GeomId)
     body = model.body(model.geom_bodyid[geom]).name
     own_body = model.body(model.geom_bodyid[target]).name
     raise SceneError(
-        f"contacts of geom {name!r} names geom {geom_name(model, geom)!r} on body {body!r}, which "
-        f"moves by itself; valid are geoms of body {own_body!r} and of those welded to it"
+        f"contacts of geom {name!r} must be geoms of body {own_body!r} and of bodies welded to "
+        f"it, got geom {geom_name(model, geom)!r} on body {body!r}, which moves by itself"
     )
 
 

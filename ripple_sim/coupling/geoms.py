@@ -95,7 +95,7 @@ def find_target(model: mujoco.MjModel, key: GeomKey) -> TargetId:
     if is_geom(target, model) and int(model.geom_type[target]) not in TARGET_TYPES:
         kind = mujoco.mjtGeom(model.geom_type[target]).name.removeprefix("mjGEOM_").lower()
         raise SceneError(
-            f"geom {key!r} is a {kind}, which cannot ripple; valid are "
+            f"geom {key!r} is a {kind}, which cannot ripple; a target must be one of "
             f"{', '.join(TARGET_TYPES.values())}"
         )
     return target
@@ -107,13 +107,13 @@ def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str
     Raises `SceneError` if they are no mapping, or a geom is missing, or has two values.
     """
     if not isinstance(values, Mapping):
-        raise SceneError(f"{what} is {shown(values)}; valid is a dict of them by geom")
+        raise SceneError(f"{what} must be a dict with a value for each geom, got {shown(values)}")
     value_by_name: dict[str, Value] = {}
     for key, value in values.items():
         name = target_name(model, find_any(model, key))
         if name in value_by_name:
             raise SceneError(
-                f"{what} has two entries for geom {name!r}, one of them as {key!r}; valid is one"
+                f"{what} must have one entry for geom {name!r}, got two, one of them as {key!r}"
             )
         value_by_name[name] = value
     return value_by_name

@@ -73,10 +73,10 @@ def hertz_moduli(model: mujoco.MjModel, targets: Mapping[str, Target]) -> dict[T
             continue
         if not POSITIVE.holds(target.modulus):
             raise SceneError(
-                f"modulus is {shown(target.modulus)} Pa for geom {name!r}, whose pulse is 'hertz'; "
-                f"valid is {POSITIVE.words}: E* of the two materials, "
-                "1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2, about 1e11 for steel on steel, "
-                "1e9 for wood, 1e6 for a rubber ball on anything hard"
+                f"modulus of geom {name!r}, whose pulse is 'hertz', must be {POSITIVE.words}, "
+                f"got {shown(target.modulus)} Pa: E* of the two materials, 1 / E* = (1 - nu1^2) "
+                "/ E1 + (1 - nu2^2) / E2, about 1e11 for steel on steel, 1e9 for wood, 1e6 for "
+                "a rubber ball on anything hard"
             )
         moduli[find_any(model, name)] = float(target.modulus or 0.0)
     return moduli
@@ -402,7 +402,10 @@ class Hits:
         target_rotation = data.geom_xmat[self._target].reshape(3, 3)
         bend = surface_bend(coupled.model, other, -normal @ rotation)
         if bend is None:
-            return "valid are spheres, ellipsoids, capsules, sides of cylinders, and planes"
+            return (
+                "Hertz's law here is for spheres, ellipsoids, capsules, sides of cylinders, and "
+                "planes"
+            )
         target_bend = atlas_bend(atlas, texels, normal @ target_rotation)
         if target_bend is None:
             return "an edge is hit"

@@ -70,20 +70,19 @@ def own_model(model: Any) -> mujoco.MjModel:
     found = getattr(model, "ptr", model)
     if not isinstance(found, mujoco.MjModel):
         raise SceneError(
-            f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel, or dm_control's"
+            f"model must be a compiled mujoco.MjModel, or dm_control's, got {type(model).__name__}"
         )
     if not 0 < found.opt.timestep <= _MAX_TIMESTEP:
         raise SceneError(
-            f"the model's timestep is {found.opt.timestep:g} s; valid is a number greater than 0 "
-            f"and up to {_MAX_TIMESTEP:g}, such as 0.002 (<option timestep=...>)"
+            f"the model's timestep must be greater than 0 and up to {_MAX_TIMESTEP:g} s, such "
+            f"as 0.002 (<option timestep=...>), got {found.opt.timestep:g} s"
         )
     for name in _CHECKED:
         values = operator.attrgetter(name)(found)
         wrong = values[~(np.abs(values) <= mujoco.mjMAXVAL)]  # NaN, too
         if len(wrong):
             raise SceneError(
-                f"the model's {name} holds {wrong[0]:g}; valid are numbers up to "
-                f"{mujoco.mjMAXVAL:g}"
+                f"the model's {name} must hold numbers up to {mujoco.mjMAXVAL:g}, got {wrong[0]:g}"
             )
     return found
 
@@ -98,7 +97,7 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
     found = data if isinstance(data, mujoco.MjData) else getattr(data, "ptr", None)
     if not isinstance(found, mujoco.MjData):
         raise SceneError(
-            f"data is {type(data).__name__}; valid is a mujoco.MjData, or dm_control's"
+            f"data must be a mujoco.MjData, or dm_control's, got {type(data).__name__}"
         )
     other = found.model
     if other is model or other in _copies.get(model, ()):

@@ -229,7 +229,8 @@ class Ripples:
         for coefficient in coefficients:
             if coefficient not in names:
                 raise SolverError(
-                    f"a material has no coefficient {coefficient!r}; valid are {', '.join(names)}"
+                    f"a material has no coefficient {coefficient!r}; coefficients are "
+                    f"{', '.join(names)}"
                 )
         material = dataclasses.replace(self._surface(name).material, **coefficients)
         self._change(name, material=material)
@@ -318,7 +319,7 @@ class Ripples:
             held = np.asarray(region, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise SolverError(
-                f"region is {region!r}; valid are numbers from 0 to 1, one for each texel"
+                f"region must be numbers from 0 to 1, one for each texel, got {region!r}"
             ) from error
         if before is not None and held.shape == before.shape:
             held = np.maximum(held, before)

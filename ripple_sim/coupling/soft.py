@@ -114,8 +114,8 @@ class SoftSurface:
         flex = self.flex
         if model.flex_dim[flex] == 1:
             raise SceneError(
-                f"flex {name!r} is a cable, which cannot ripple; valid are surfaces and solids "
-                "(dim 2 and 3)"
+                f"flex {name!r} is a cable, which cannot ripple: a target must be a surface or "
+                "a solid (dim 2 or 3)"
             )
         if model.flex_dim[flex] == 3:
             first = model.flex_shelldataadr[flex]

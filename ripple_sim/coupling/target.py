@@ -94,14 +94,14 @@ def named_targets(
     """
     if not isinstance(materials, Mapping):
         raise SceneError(
-            f"materials is {type(materials).__name__}; valid is a mapping of geom names to "
-            "Material or Target"
+            "materials must be a mapping of geom names to Material or Target, got "
+            f"{type(materials).__name__}"
         )
     for key, value in materials.items():
         find_target(model, key)
         if not isinstance(value, (Material, Target)):
             raise SceneError(
-                f"material of geom {key!r} is {shown(value)}; valid is a Material or a Target"
+                f"material of geom {key!r} must be a Material or a Target, got {shown(value)}"
             )
     targets = {}
     for name, value in by_name(model, materials, "materials").items():

@@ -53,12 +53,12 @@ class TunnellingCheck:
     by v t_stop before the contact's spring has stopped it: t_stop = tau zeta exp(-zeta) for a
     `solref` of time constant tau and damping ratio zeta (a critically damped spring at zeta = 1).
     Past the sum of the two geoms' smallest half-extents it comes out on the other side or stays
-    inside; the first geoms that did so were seen at 0.9 of the sum. A geom that is inside an SDF geom by
-    more than its own half-extent is pushed from all sides: the normal forces then add up to many
-    times the momentum exchanged. A warning names the worst pair, and comes again only where another
-    pair is twice as bad: a humanoid that falls has dozens of pairs, and one advice serves them all.
-    MuJoCo's speculative contacts, where the version has them and they are enabled, stop geoms in
-    time, but not at SDF geoms or flexes: then only SDF geoms and flexes are checked.
+    inside; the first geoms that did so were seen at 0.9 of the sum. A geom that is inside an SDF
+    geom by more than its own half-extent is pushed from all sides: the normal forces then add up to
+    many times the momentum exchanged. A warning names the worst pair, and comes again only where
+    another pair is twice as bad: a humanoid that falls has dozens of pairs, and one advice serves
+    them all. MuJoCo's speculative contacts, where the version has them and they are enabled, stop
+    geoms in time, but not at SDF geoms or flexes: then only SDF geoms and flexes are checked.
 
     A flex collider holds geoms off by its thickness, which counts in place of the half-extent of
     its geom. Cylinders that sink in by 0.7 of the thickness begin to be thrown aside.

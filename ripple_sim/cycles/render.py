@@ -66,8 +66,8 @@ _ADVICE = (
     f"set {PYTHON}=blender/bin/python"
 )
 
-# Light that the renderer's soft boxes give to diffuse surfaces, over that of lights of their size and
-# radiance.
+# Light that the renderer's soft boxes give to diffuse surfaces, over that of lights of their size
+# and radiance.
 _DIFFUSE_SHARE = 0.13 * np.pi / 4
 
 # paths per pixel
@@ -94,7 +94,7 @@ def python_with_bpy() -> str:
     version = _version_of_bpy(python)
     if version < OLDEST:
         found, oldest = (".".join(map(str, each)) for each in (version, OLDEST))
-        raise VideoError(f"{python} has bpy {found}; valid is {oldest} or later: {_ADVICE}")
+        raise VideoError(f"{python} must have bpy {oldest} or later, got {found}: {_ADVICE}")
     return python
 
 
@@ -297,9 +297,7 @@ def check_cycles(options: VideoOptions, output: Path, samples: int = SAMPLES) ->
                 f"the renderer cycles has no --{name}; leave it out, or render with --renderer gl"
             )
     if not isinstance(samples, int) or not 1 <= samples <= 65536:
-        raise VideoError(
-            f"there shall be {samples!r} samples; valid is a whole number from 1 to 65536"
-        )
+        raise VideoError(f"samples must be a whole number from 1 to 65536, got {samples!r}")
     check_options(options, output)
     try:
         ending_of(Path("stage.usdc"))

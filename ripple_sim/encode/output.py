@@ -48,7 +48,7 @@ _FRAME_PATTERN = re.compile(rf"frame_\d{{5,}}\.({'|'.join(FRAME_FORMATS)})")
 _SUBSAMPLED = (".mp4", ".webm")
 _WITH_OPACITY = (".webp", *FRAME_FORMATS)
 _VALID = (
-    f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder of PNG or EXR frames"
+    f"it must be {', '.join(ENDINGS)}, or a name without ending for a folder of PNG or EXR frames"
 )
 
 
@@ -144,7 +144,7 @@ def video_format(path: Path, frame_format: str = "png") -> str:
     """
     if frame_format not in FRAME_FORMATS:
         raise VideoError(
-            f"frame format is {frame_format!r}; valid is {' or '.join(map(repr, FRAME_FORMATS))}"
+            f"frame format must be {' or '.join(map(repr, FRAME_FORMATS))}, got {frame_format!r}"
         )
     name = path.name
     if name in ("", "..") or name.lower() in ENDINGS:
@@ -203,13 +203,13 @@ def check_output(
                     "out (--overlay '', and no --compare), or write PNG frames"
                 )
         if transparent and form not in _WITH_OPACITY:
-            raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of frames")
+            raise VideoError(f"{path} cannot be transparent: write .webp or a folder of frames")
         check_size(width, height)
         if form == ".mp4" and -(-width // 16) * -(-height // 16) > _MAX_H264_BLOCKS:
             raise VideoError(
                 f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends "
-                f"at {_MAX_H264_BLOCKS} blocks of 16x16, such as 8192x4352: make it smaller, or write "
-                ".webm, .gif, .webp or a folder of frames"
+                f"at {_MAX_H264_BLOCKS} blocks of 16x16, such as 8192x4352: make it smaller, or "
+                "write .webm, .gif, .webp or a folder of frames"
             )
         if form in _SUBSAMPLED and (width % 2 or height % 2):
             raise VideoError(
@@ -220,7 +220,7 @@ def check_output(
         if not isinstance(fps, int) or not 1 <= fps <= highest:
             what = "a GIF's frame rate" if form == ".gif" else "frame rate"
             raise VideoError(
-                f"{what} is {fps}; valid is a whole number from 1 to {highest} frames per second"
+                f"{what} must be a whole number from 1 to {highest} frames per second, got {fps}"
             )
         _check_place(path, form, overwrite)
     except OSError as error:
@@ -237,8 +237,8 @@ def check_size(width: int, height: int) -> None:
     """
     if not all(isinstance(side, int) and MIN_SIZE <= side <= MAX_SIZE for side in (width, height)):
         raise VideoError(
-            f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each "
-            "side"
+            f"frame size must be {MIN_SIZE} to {MAX_SIZE} pixels along each side, got "
+            f"{width}x{height}"
         )
 
 

@@ -128,10 +128,10 @@ def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: boo
     """
     unknown = [name for name in passes if name not in PASSES]
     if unknown:
-        raise VideoError(f"there is no pass {unknown[0]!r}; valid are {', '.join(PASSES)}")
+        raise VideoError(f"there is no pass {unknown[0]!r}; passes are {', '.join(PASSES)}")
     if form not in PASS_FORMATS:
         raise VideoError(
-            f"pass format is {form!r}; valid is {' or '.join(map(repr, PASS_FORMATS))}"
+            f"pass format must be {' or '.join(map(repr, PASS_FORMATS))}, got {form!r}"
         )
     if form == "exr":
         check_exr()

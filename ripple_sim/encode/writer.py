@@ -95,8 +95,8 @@ class FrameWriter:
             raise VideoError(f"the video {self.path} is closed; open another writer")
         if frame.shape != self._shape or frame.dtype != self._type:
             raise VideoError(
-                f"frame is {frame.dtype} {list(frame.shape)}; valid is {self._type} "
-                f"{list(self._shape)}"
+                f"frame must be {self._type} {list(self._shape)}, got {frame.dtype} "
+                f"{list(frame.shape)}"
             )
         self._raise_error()
         self._queue.put(frame.copy())

@@ -153,7 +153,7 @@ def ending_of(path: Path) -> Ending:
     if path.name.lower() in ENDINGS or suffix not in ENDINGS:
         problem = f"ends in {path.suffix}" if path.suffix else "has no ending"
         raise ExportError(
-            f"output {str(path)!r} {problem}; valid is a name that ends in {', '.join(ENDINGS)}"
+            f"output {str(path)!r} {problem}: it must be a name that ends in {', '.join(ENDINGS)}"
         )
     ending = ENDINGS[suffix]
     if ending.package is not None and importlib.util.find_spec(ending.package) is None:
@@ -189,9 +189,8 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
         # the writer, and `made_here`, go by the ending
         if final.suffix.lower() != path.suffix.lower():
             raise ExportError(
-                f"output {str(path)!r} is a link to {final.name!r}; valid is a link to a name that "
-                f"ends in "
-                f"{path.suffix}"
+                f"output {str(path)!r} is a link to {final.name!r}: it must be a link to a name "
+                f"that ends in {path.suffix}"
             )
         _check_replaceable(final, ending.made_here, overwrite)
         folder = next(parent for parent in final.parents if parent.exists())
@@ -208,8 +207,8 @@ def check_options(options: ExportOptions) -> None:
     """Check the options of an export, before anything that takes time; raise `RippleError`."""
     if options.fps > MAX_FPS:
         raise ExportError(
-            f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a "
-            f"second"
+            f"frame rate must be a whole number from 1 to {MAX_FPS} frames a second, got "
+            f"{options.fps!r}"
         )
     if options.resume and options.chunk is None:
         raise ExportError(
@@ -225,15 +224,12 @@ def check_written(
     check_size(*size)
     if not isinstance(triangles, int) or not 1 <= triangles <= LARGEST_MESH:
         raise ExportError(
-            f"there shall be {shown(triangles)} triangles; valid is a whole number, 1 to "
-            f"{LARGEST_MESH}"
+            f"triangles must be a whole number from 1 to {LARGEST_MESH}, got {shown(triangles)}"
         )
     if chunk is not None and (not isinstance(chunk, int) or chunk < 1):
-        raise ExportError(
-            f"a chunk shall have {shown(chunk)} frames; valid is a whole number from 1"
-        )
+        raise ExportError(f"frames of a chunk must be a whole number from 1, got {shown(chunk)}")
     if tessellation not in TESSELLATIONS:
         raise ExportError(
-            f"tessellation is {shown(tessellation)}; valid are "
-            f"{' and '.join(map(repr, TESSELLATIONS))}"
+            f"tessellation must be one of {', '.join(map(repr, TESSELLATIONS))}, got "
+            f"{shown(tessellation)}"
         )

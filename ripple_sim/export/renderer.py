@@ -280,8 +280,8 @@ class RippleRenderer:
         )
         if out is not None and out.shape != shape:
             raise RenderError(
-                f"out has shape {list(out.shape)}; valid is {list(shape)}, that of the "
-                f"{self._shows}"
+                f"out must have the shape of the {self._shows}, {list(shape)}, got "
+                f"{list(out.shape)}"
             )
         if self._shows == "colours":  # MuJoCo has none of them in the others
             self._warn_of_flags()
@@ -365,9 +365,7 @@ class RippleRenderer:
                 f"one"
             )
         if not 0 <= index < count:
-            raise RenderError(
-                f"{kind} is {index!r}; the model has {count} of them, with ids from 0"
-            )
+            raise RenderError(f"{kind} must be an id below {count}, from 0, got {index!r}")
         self._renderer.upload(kind, index)
 
     def _now(self) -> tuple[mujoco.MjData, dict[TargetId, AnyHeightMap], Viewpoint]:

@@ -316,7 +316,7 @@ def check_plot_path(path: str | Path, overwrite: bool = True) -> None:
     path = Path(path)
     if path.suffix.lower() not in _ENDINGS:
         raise AtlasError(
-            f"plot file {str(path)!r} has an unknown ending; valid are {', '.join(_ENDINGS)}"
+            f"plot file {str(path)!r} has an unknown ending: it must end in {', '.join(_ENDINGS)}"
         )
     if not path.absolute().parent.is_dir() or path.is_dir():
         raise AtlasError(

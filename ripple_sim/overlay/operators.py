@@ -25,6 +25,6 @@ def compared_operators(baseline: str | None) -> tuple[str, ...]:
         return (OWN,)
     if baseline not in BASELINES:
         raise SceneError(
-            f"there is no operator {baseline!r} to compare with; valid are {', '.join(BASELINES)}"
+            f"the operator to compare with must be one of {', '.join(BASELINES)}, got {baseline!r}"
         )
     return OWN, baseline

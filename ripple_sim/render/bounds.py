@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from .pose import Pose
 
-# Gap between the eye and a ball, in radii of the ball, up to which the ball's box is the whole frame.
+# Gap between the eye and a ball, in radii of the ball, up to which the ball's box is the whole
+# frame.
 _MIN_GAP_OF_BOX = 0.01
 
 

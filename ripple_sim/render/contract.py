@@ -37,8 +37,8 @@ LEVELS = {
     "LAYER": 0.125,  # the transparent object that is being drawn
 }
 
-# Shapes, in float32, of types that std140 and std430 lay out alike. The columns of a mat3 are padded
-# to four numbers.
+# Shapes, in float32, of types that std140 and std430 lay out alike. The columns of a mat3 are
+# padded to four numbers.
 _SHAPES: dict[str, tuple[int, ...]] = {"vec4": (4,), "mat3": (3, 4), "mat4": (4, 4)}
 
 

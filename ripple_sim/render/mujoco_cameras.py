@@ -43,8 +43,8 @@ def mujoco_camera(model: mujoco.MjModel, camera: Any) -> mujoco.MjvCamera:
         return _mujoco_camera_by_name(model, camera)
     if not isinstance(camera, mujoco.MjvCamera):
         raise SceneError(
-            f"camera is {type(camera).__name__}; valid are a Camera, a FixedCamera, the name or "
-            "the id of a camera in the model, -1 for the free camera, and a mujoco.MjvCamera"
+            "camera must be a Camera, a FixedCamera, the name or the id of a camera in the "
+            f"model, -1 for the free camera, or a mujoco.MjvCamera, got {type(camera).__name__}"
         )
     _check_mujoco_camera(model, camera)
     return camera
@@ -69,15 +69,14 @@ def _check_mujoco_camera(model: mujoco.MjModel, camera: mujoco.MjvCamera) -> Non
     elif camera.type == kinds.mjCAMERA_TRACKING:
         if not 0 <= camera.trackbodyid < model.nbody:
             raise SceneError(
-                f"the MjvCamera's trackbodyid is {camera.trackbodyid}; valid are 0 to "
-                f"{model.nbody - 1}, the model's bodies"
+                "the MjvCamera's trackbodyid must be a body of the model, 0 to "
+                f"{model.nbody - 1}, got {camera.trackbodyid}"
             )
     elif camera.type != kinds.mjCAMERA_FREE:
         raise SceneError(
-            f"the MjvCamera's type is {camera.type}; valid are "
-            f"mjCAMERA_FREE ({int(kinds.mjCAMERA_FREE)}), "
-            f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) and "
-            f"mjCAMERA_FIXED ({int(kinds.mjCAMERA_FIXED)})"
+            f"the MjvCamera's type must be mjCAMERA_FREE ({int(kinds.mjCAMERA_FREE)}), "
+            f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) or mjCAMERA_FIXED "
+            f"({int(kinds.mjCAMERA_FIXED)}), got {camera.type}"
         )
 
 

@@ -441,9 +441,9 @@ class Renderer:
         """Draw distances, normals and geoms at the middle of each pixel, without light.
 
         Transparent objects count as solid. Arguments are as for `render`. `size` (width, height)
-        may differ from the frames' size, but not its proportions. Objects of a `scene` have MuJoCo's
-        shapes: boxes and cylinders without round edges. If `segmented`, only objects that MuJoCo
-        would segment are drawn.
+        may differ from the frames' size, but not its proportions. Objects of a `scene` have
+        MuJoCo's shapes: boxes and cylinders without round edges. If `segmented`, only objects that
+        MuJoCo would segment are drawn.
         """
         drawn = self._scene
         pose = camera.pose()

@@ -45,8 +45,8 @@ _BALL_COUNT = 16
 _BIAS_PER_HEIGHT = 1.5
 _MAX_BIAS = 0.015
 
-# The ball about a mesh that moves is this much larger than the mesh, and grows in steps of an eighth
-# of an octave, so that shadow maps stay as they are while the surface wobbles.
+# The ball about a mesh that moves is this much larger than the mesh, and grows in steps of an
+# eighth of an octave, so that shadow maps stay as they are while the surface wobbles.
 _REACH_MARGIN = 1.02
 _REACH_STEPS_PER_OCTAVE = 8
 
@@ -236,8 +236,9 @@ class SurfaceMesh:
             height_map = np.zeros(self._shape, dtype=np.float32)
         if height_map.shape != self._shape:
             raise RippleError(
-                f"the height map of geom {self.geom} has shape {list(height_map.shape)}; valid is "
-                f"{list(self._shape)}: charts with a halo of one texel, gradient and height"
+                f"the height map of geom {self.geom} must have shape {list(self._shape)} "
+                "(charts with a halo of one texel, gradient and height), got "
+                f"{list(height_map.shape)}"
             )
         if not isinstance(height_map, np.ndarray) and height_map.gl is not self._gl:
             height_map = np.asarray(height_map)  # from the memory of another device

@@ -214,7 +214,8 @@ class RandomEntry(msgspec.Struct, forbid_unknown_fields=True):
     seed: int = 0
     """Another seed, another variation; `render --seed` overrides it."""
     position: float = 0.0
-    """Largest shift along each axis, of a body's place and of the place it is dropped or thrown from [m]."""
+    """Largest shift along each axis, of a body's place and of the place it is dropped or thrown
+    from [m]."""
     orientation: bool = False
     """Whether to turn the bodies at random."""
     size: tuple[float, float] = (1.0, 1.0)
@@ -291,15 +292,13 @@ def _check(entry: RandomEntry) -> None:
     for name, (low, high) in (("size", entry.size), ("mass", entry.mass)):
         if not 0 < low <= high < np.inf:
             raise SceneError(
-                f"[random] {name} is [{low!r}, {high!r}]; valid are two positive factors, the "
-                "lower one first"
+                f"[random] {name} must be two positive factors, the lower one first, got "
+                f"[{low!r}, {high!r}]"
             )
     if not 0 <= entry.position < np.inf:
-        raise SceneError(f"[random] position is {entry.position!r} m; valid is 0 or greater")
+        raise SceneError(f"[random] position must be 0 or greater, got {entry.position!r} m")
     if entry.seed < 0:
-        raise SceneError(f"[random] seed is {entry.seed}; valid is 0 or greater")
+        raise SceneError(f"[random] seed must be 0 or greater, got {entry.seed}")
     for shape in entry.shapes:
         if shape not in BODY_SHAPES:
-            raise SceneError(
-                f"[random] names the shape {shape!r}; valid are {', '.join(BODY_SHAPES)}"
-            )
+            raise SceneError(f"[random] shapes must be of {', '.join(BODY_SHAPES)}, got {shape!r}")

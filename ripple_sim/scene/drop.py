@@ -149,9 +149,9 @@ def drop_scene(
         For any other invalid argument, or if MuJoCo refuses the mesh.
     """
     if not (isinstance(bodies, numbers.Integral) and 0 <= int(bodies) <= 100):
-        raise SceneError(f"the number of bodies is {shown(bodies)}; valid is 0 to 100")
+        raise SceneError(f"the number of bodies must be 0 to 100, got {shown(bodies)}")
     if up is not None and up not in UP_AXES:
-        raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
+        raise SceneError(f"the up axis must be {' or '.join(map(repr, UP_AXES))}, got {up!r}")
     mesh = load_mesh(mesh_path, **reading)
     V = _standing(mesh, up or _up(mesh, usual_up(mesh_path)))
     camera, eye = _camera(V, mesh.F, mesh.closed)

@@ -88,15 +88,15 @@ def free_joint(
         )
     joint = int(model.body_jntadr[body])
     if joint < 0 or model.jnt_type[joint] != int(mujoco.mjtJoint.mjJNT_FREE):
-        valid = "only free bodies can drop" if verb == "drop" else "valid are free bodies"
+        valid = "only free bodies can drop" if verb == "drop" else "name a free body"
         raise SceneError(
             f"[[{verb}]] names the body {entry.body!r}, which has no <freejoint/>; {valid}"
         )
     check_time(verb, entry.body, entry.time)
     if entry.orientation is not None and not np.linalg.norm(entry.orientation) > 0:
         raise SceneError(
-            f"[[{verb}]] of body {entry.body!r} has orientation {entry.orientation}; valid is w x "
-            "y z, not 0"
+            f"[[{verb}]] of body {entry.body!r}: orientation must be w x y z, not 0, got "
+            f"{entry.orientation}"
         )
     return int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
 
@@ -104,7 +104,7 @@ def free_joint(
 def check_time(verb: str, name: str, time: float) -> None:
     """Refuse negative times, infinity and NaN."""
     if not 0 <= time < float("inf"):
-        raise SceneError(f"[[{verb}]] of {name!r} has time {time!r} s; valid is 0 or greater")
+        raise SceneError(f"[[{verb}]] of {name!r}: time must be 0 or greater, got {time!r} s")
 
 
 class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -115,8 +115,8 @@ class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
     time: float
     """[s]"""
     point: Vector
-    """In the frame of the geom's body, which is the world's for a fixed target [m]; the nearest point of the surface is
-    taken."""
+    """In the frame of the geom's body, which is the world's for a fixed target [m]; the nearest
+    point of the surface is taken."""
     impulse: float
     """[N s]; positive presses inwards."""
     radius: float = 0.0
@@ -249,8 +249,9 @@ def _check_surface(
     numbers = [entry.impulse, *entry.point]
     if not (np.isfinite(numbers).all() and 0 <= entry.radius < np.inf):
         raise SceneError(
-            f"[[poke]] of {entry.geom!r} has point {entry.point} m, impulse {entry.impulse!r} N s, "
-            f"radius {entry.radius!r} m; valid are finite numbers, the radius 0 or greater"
+            f"[[poke]] of {entry.geom!r}: point, impulse and radius must be finite numbers, the "
+            f"radius 0 or greater, got point {entry.point} m, impulse {entry.impulse!r} N s, "
+            f"radius {entry.radius!r} m"
         )
 
 
@@ -266,6 +267,6 @@ def _actuator(model: mujoco.MjModel, entry: ControlEntry) -> int:
         )
     if not np.isfinite(entry.value):
         raise SceneError(
-            f"[[control]] of {entry.actuator!r} has value {entry.value!r}; valid is a finite number"
+            f"[[control]] of {entry.actuator!r}: value must be a finite number, got {entry.value!r}"
         )
     return int(actuator)

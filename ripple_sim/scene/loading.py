@@ -98,14 +98,14 @@ def check_scene(scene: Scene) -> None:
     seen = set()
     for entry in scene.targets:
         if entry.geom in seen:
-            raise SceneError(f"geom {entry.geom!r} has two [[ripple]] entries; valid is one")
+            raise SceneError(f"geom {entry.geom!r} must have one [[ripple]] entry, got two")
         seen.add(entry.geom)
         _check_target(scene.model, entry)
     named_collision_geoms(scene.model, [entry.geom for entry in scene.targets], scene.contacts)
     _check_sensors(scene)
     if scene.lighting not in LIGHTING:
         raise SceneError(
-            f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}"
+            f"lighting must be one of {', '.join(map(repr, LIGHTING))}, got {scene.lighting!r}"
         )
     Script(scene.model, scene.events, [entry.geom for entry in scene.targets])
     _warn_of_late_events(scene)
@@ -131,13 +131,15 @@ def _check_sensors(scene: Scene) -> None:
     names = set()
     for entry in scene.sensors:
         if entry.name in names:
-            raise SceneError(f"two sensors are called {entry.name!r}; valid is one")
+            raise SceneError(
+                f"the names of sensors must differ, got two sensors called {entry.name!r}"
+            )
         names.add(entry.name)
         if entry.geom not in targets:
             valid = ", ".join(map(repr, targets))
             raise SceneError(
-                f"sensor {entry.name!r} is on {entry.geom!r}, which does not ripple; valid are "
-                f"{valid}"
+                f"sensor {entry.name!r} is on {entry.geom!r}, which does not ripple; targets "
+                f"are {valid}"
             )
         places = [entry.site is not None, entry.point is not None, len(entry.points) > 0]
         if places.count(True) != 1:
@@ -157,12 +159,12 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     find_target(model, entry.geom)
     for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS)):
         if name not in valid:
-            raise SceneError(f"{what} {name!r} does not exist; valid are {', '.join(valid)}")
+            raise SceneError(f"{what} must be one of {', '.join(valid)}, got {name!r}")
     check_rim(entry.rim)
     if entry.color is not None and not all(0 <= channel <= 1 for channel in entry.color):
         raise SceneError(
-            f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 "
-            "(sRGB)"
+            f"color of geom {entry.geom!r} must be three numbers from 0 to 1 (sRGB), got "
+            f"{entry.color}"
         )
     entry.material.material(np.ones((1, 1, 1)) if entry.inside else None)
     for body in entry.inside:
@@ -177,8 +179,8 @@ def _check_layer_and_maps(entry: RippleEntry) -> None:
     least, greatest = entry.thickness_limits
     if not 0 <= least <= greatest:
         raise SceneError(
-            f"thickness_limits of geom {entry.geom!r} are {entry.thickness_limits} m; valid are "
-            "two numbers from 0 on, the least first"
+            f"thickness_limits of geom {entry.geom!r} must be two numbers from 0 on, the least "
+            f"first, got {entry.thickness_limits} m"
         )
     for coefficient, texture in entry.material.maps().items():
         _check_image(
@@ -193,15 +195,17 @@ def _check_layer_and_maps(entry: RippleEntry) -> None:
     for disc in entry.still:
         if not 0 < disc.radius < float("inf"):
             raise SceneError(
-                f"a [[ripple.still]] disc of geom {entry.geom!r} has radius {disc.radius!r} m; "
-                "valid is above 0"
+                f"the radius of a [[ripple.still]] disc of geom {entry.geom!r} must be above 0, "
+                f"got {disc.radius!r} m"
             )
 
 
 def _check_image(key: str, path: str, valid: str) -> None:
     """Refuse an image that does not exist; `valid` is what the key may hold."""
     if not Path(path).is_file():
-        raise SceneError(f"{key} names the image {path!r}, which does not exist; valid is {valid}")
+        raise SceneError(
+            f"{key} names the image {path!r}, which does not exist: it must be {valid}"
+        )
 
 
 def check_files(path: Path) -> None:
@@ -225,7 +229,7 @@ def check_files(path: Path) -> None:
                 line, column = error.position
                 raise SceneError(
                     f"the model {str(xml)!r} refers to an unknown character, at line {line}, "
-                    f"column {column}: MuJoCo would cut the text there; valid are names without a "
+                    f"column {column}: MuJoCo would cut the text there; names must be without a "
                     "NUL"
                 ) from error
             continue  # MuJoCo says what is wrong
@@ -416,14 +420,14 @@ def load_model(
     for number, (name, count) in enumerate(keys):
         if edit is None and count not in (0, model.nq):
             raise SceneError(
-                f"keyframe {name or number!r} of {str(path)!r} has {count} positions (qpos); valid "
-                f"are {model.nq}, as the model has"
+                f"keyframe {name or number!r} of {str(path)!r} must have {model.nq} positions "
+                f"(qpos), as the model has, got {count}"
             )
     for key, numbers in enumerate(np.hstack([model.key_qpos, model.key_qvel])):
         if not np.isfinite(numbers).all():
             raise SceneError(
-                f"keyframe {model.key(key).name or key!r} of {str(path)!r} holds NaN or inf; valid "
-                "are finite numbers"
+                f"keyframe {model.key(key).name or key!r} of {str(path)!r} must hold finite "
+                "numbers, got NaN or inf"
             )
     for warning in caught:
         warn_caller(str(warning.message), warning.category)

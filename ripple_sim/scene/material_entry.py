@@ -94,9 +94,7 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
 def _law(name: str) -> str:
     """Constructor of `Material` that makes a preset; raises `SceneError` for an unknown one."""
     if name not in (*LAWS, *PRESETS):
-        raise SceneError(
-            f"the preset {name!r} does not exist; valid are {', '.join((*LAWS, *PRESETS))}"
-        )
+        raise SceneError(f"preset must be one of {', '.join((*LAWS, *PRESETS))}, got {name!r}")
     return PRESETS[name].law if name in PRESETS else name
 
 
@@ -109,7 +107,8 @@ def preset_material(name: str, given: dict[str, Any]) -> Material:
     for key in given:
         if key not in parameters:
             raise SceneError(
-                f"the preset {name!r} has no parameter {key!r}; valid are {', '.join(parameters)}"
+                f"the preset {name!r} has no parameter {key!r}; its parameters are "
+                f"{', '.join(parameters)}"
             )
     if name in PRESETS:
         return Material.preset(name, **given)

@@ -51,7 +51,7 @@ def parse_request(words: Iterable[str]) -> Request:
     for word in words:
         name, given, value = word.strip().partition("=")
         if name not in NAMES:
-            raise SceneError(f"there is no overlay {name!r}; valid are {', '.join(NAMES)}")
+            raise SceneError(f"there is no overlay {name!r}; overlays are {', '.join(NAMES)}")
         if given and name not in HEATMAPS:
             raise SceneError(
                 f"overlay {word.strip()!r}: {name} has no range; only {' and '.join(HEATMAPS)} "

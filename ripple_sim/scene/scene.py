@@ -25,11 +25,11 @@ def check_duration(duration: float, slow_motion: float = 1.0) -> None:
     """Raise `SceneError` if the duration [s] of a run or its slow motion is out of range."""
     if not 0 < duration < MAX_DURATION:
         raise SceneError(
-            f"duration is {duration!r} s; valid is a positive number, less than {MAX_DURATION}"
+            f"duration must be a positive number, less than {MAX_DURATION}, got {duration!r} s"
         )
     if not 0 < slow_motion <= MAX_SLOW_MOTION:
         raise SceneError(
-            f"slow motion is {slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}"
+            f"slow motion must be a positive number up to {MAX_SLOW_MOTION}, got {slow_motion!r}"
         )
 
 

@@ -57,16 +57,17 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     layout: str = "auto"
     """How the surface gets its charts: "cube", "patches" or "auto", see `build_atlas`."""
     rim: str | dict[str, str] = "free"
-    """Rims of an open surface: waves come back upright from a free one, inverted from one that is held. By region, a
-    table such as `rim = {clamped = "x < -0.24"}`: conditions as in `ripple.height`, of which the first that holds
-    counts; the rest is free."""
+    """Rims of an open surface: waves come back upright from a free one, inverted from one that is
+    held. By region, a table such as `rim = {clamped = "x < -0.24"}`: conditions as in
+    `ripple.height`, of which the first that holds counts; the rest is free."""
     conserve_volume: bool | None = None
-    """Whether the mean of every push is taken out, so that the surface keeps its volume; by default on closed surfaces,
-    and on open ones that no rim, clamp or stiffness holds."""
+    """Whether the mean of every push is taken out, so that the surface keeps its volume; by default
+    on closed surfaces, and on open ones that no rim, clamp or stiffness holds."""
     look: str = "rubber"
     """What the surface looks made of; `model` as the MJCF's material says."""
     color: Color | None = None
-    """sRGB, 0 to 1; by default the texture or colour that the MJCF gives the geom, or else the look's."""
+    """sRGB, 0 to 1; by default the texture or colour that the MJCF gives the geom, or else the
+    look's."""
     material: MaterialEntry = msgspec.field(default_factory=MaterialEntry)
     """The wave equation's coefficients, see below."""
     still: list[StillEntry] = []
@@ -78,13 +79,16 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     height: HeightEntry | None = None
     """The shape of the surface at the beginning, see below; by default it is flat."""
     thickness_limits: tuple[float, float] = (0.0, math.inf)
-    """Least and greatest thickness of a layer over what is inside [m]: beyond them it counts as these."""
+    """Least and greatest thickness of a layer over what is inside [m]: beyond them it counts as
+    these."""
     contacts: list[str] | None = None
     """Geoms that collide for a geom that is only visible; by default those of its body."""
     high_pass: bool = False
-    """Whether a flex keeps to itself the coarse motion that contacts give it; its waves get the fine rest."""
+    """Whether a flex keeps to itself the coarse motion that contacts give it; its waves get the
+    fine rest."""
     pulse: str = "contact"
-    """How long a hit takes: `contact`, as MuJoCo holds it, or `hertz`, as two elastic bodies touch."""
+    """How long a hit takes: `contact`, as MuJoCo holds it, or `hertz`, as two elastic bodies
+    touch."""
     modulus: float | None = None
     """For `hertz`: E* of the two materials [Pa], 1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2."""
     limit: bool = True
@@ -144,8 +148,8 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     two_way: bool = False
     """Let surfaces push back on bodies."""
     lighting: str = "auto"
-    """`model`: the MJCF's lamps and skybox; `studio`: a photo studio instead; `auto`: the studio if the MJCF has no
-    lamp."""
+    """`model`: the MJCF's lamps and skybox; `studio`: a photo studio instead; `auto`: the studio if
+    the MJCF has no lamp."""
     overlay: list[str] = []
     """Drawn on the video; a heatmap may have an end of its colours [m, m/s]: `"height=0.02"`."""
     camera: CameraEntry = msgspec.field(default_factory=CameraEntry)
@@ -220,10 +224,10 @@ def _check_values(value: Any, place: str, what: str) -> None:
     elif isinstance(value, str) and re.search(
         "[\0\ud800-\udfff]", value
     ):  # the latter are halves of pairs
-        raise SceneError(f"{what}: {place} is {shown(value)}; valid are names without a NUL")
+        raise SceneError(f"{what}: {place} must be a name without a NUL, got {shown(value)}")
     elif isinstance(value, (int, float)) and not abs(value) <= _MAX_NUMBER:
         raise SceneError(
-            f"{what}: {place} is {shown(value)}; valid are numbers up to {_MAX_NUMBER:g}"
+            f"{what}: {place} must be a number up to {_MAX_NUMBER:g}, got {shown(value)}"
         )
 
 
@@ -245,7 +249,7 @@ def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str =
     for key, value in table.items():
         if key not in fields:
             where = f" in [{place}]" if place else ""
-            raise SceneError(f"{what}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
+            raise SceneError(f"{what}: unknown key {key!r}{where}; keys are {', '.join(fields)}")
         inner = table_of(fields[key])
         inner_place = f"{place}.{key}" if place else key
         if inner is not None:

@@ -92,8 +92,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     parts = max(len(re.findall(r"[^.\s]\s*\.", key)) + 1 for key in keys)
     if parts > _MAX_KEY_PARTS:
         raise SceneError(
-            f"{name} has a key of {parts} parts with dots between them; valid are at most "
-            f"{_MAX_KEY_PARTS}"
+            f"{name}: a key must have at most {_MAX_KEY_PARTS} parts with dots between them, "
+            f"got {parts}"
         )
     try:
         return tomllib.loads(text)

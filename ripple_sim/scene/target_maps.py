@@ -65,7 +65,7 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
     """
     try:
         if len(text) > _MAX_LENGTH:
-            raise SceneError(f"it has {len(text)} characters, valid are {_MAX_LENGTH} at most")
+            raise SceneError(f"it must have at most {_MAX_LENGTH} characters, got {len(text)}")
         tree = ast.parse(text.strip(), mode="eval")
         with np.errstate(all="ignore"):
             value = _value(tree.body, {"pi": np.pi, **variables})
@@ -77,9 +77,7 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
             f"the expression {shown(text)} is not valid: {str(error).splitlines()[0]}"
         ) from error
     if not np.isfinite(result).all():
-        raise SceneError(
-            f"the expression {shown(text)} is not finite everywhere; valid are finite heights"
-        )
+        raise SceneError(f"the expression must be finite everywhere, got {shown(text)}")
     return result
 
 
@@ -99,11 +97,11 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
             function, count = FUNCTIONS[name]
             if len(arguments) != count:
-                raise SceneError(f"{name} has {len(arguments)} arguments, valid are {count}")
+                raise SceneError(f"{name} must have {count} arguments, got {len(arguments)}")
             return function(*[_value(argument, names) for argument in arguments])
     what = shown(ast.unparse(node))
     valid = f"numbers, {', '.join(names)}, + - * / % **, and {', '.join(FUNCTIONS)}"
-    raise SceneError(f"{what} is unknown; valid are {valid}")
+    raise SceneError(f"{what} is unknown; an expression may have {valid}")
 
 
 class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -113,9 +111,9 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
     """
 
     expression: str | None = None
-    """Height [m] as an expression of the position x, y, z in the frame of the geom's body [m], such as
-    "0.02 * exp(-(x**2 + y**2) / 0.1**2)"; functions are abs, sqrt, exp, log, sin, cos, tan, atan2, hypot, minimum,
-    maximum and where(condition, then, otherwise)."""
+    """Height [m] as an expression of the position x, y, z in the frame of the geom's body [m], such
+    as "0.02 * exp(-(x**2 + y**2) / 0.1**2)"; functions are abs, sqrt, exp, log, sin, cos, tan,
+    atan2, hypot, minimum, maximum and where(condition, then, otherwise)."""
     map: str | None = None
     """Instead, path of an image in the mesh's own texture coordinates."""
     low: float = 0.0
@@ -125,7 +123,8 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
     channel: str = "luminance"
     """Part of the image that counts."""
     field: str | None = None
-    """Instead, path of a .npy with one height a texel [m], [C, n, n], as `numpy.save(path, waves.height)` writes it."""
+    """Instead, path of a .npy with one height a texel [m], [C, n, n], as `numpy.save(path,
+    waves.height)` writes it."""
 
     def located(self, folder: Path) -> HeightEntry:
         """The same with its paths made relative to a folder."""
@@ -138,8 +137,8 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
         given = [key for key in ("expression", "map", "field") if getattr(self, key) is not None]
         if len(given) != 1:
             raise SceneError(
-                f"[ripple.height] has {' and '.join(given) or 'no shape'}; valid is one of "
-                "expression, map, field"
+                "[ripple.height] must have one of expression, map, field, got "
+                f"{' and '.join(given) or 'none'}"
             )
         for key in ("map", "field"):
             path = getattr(self, key)
@@ -176,7 +175,7 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
             or field.dtype.kind not in "iuf"
         ):
             held = getattr(field, "shape", "no array")
-            raise SceneError(f"saved field {path!r} holds {held}; valid are numbers {shape}")
+            raise SceneError(f"saved field {path!r} must hold numbers {shape}, got {held}")
         if not np.isfinite(field).all():
             raise SceneError(f"saved field {path!r} has heights that are not finite")
         return field.astype(np.float64)
@@ -189,7 +188,7 @@ def check_rim(rim: str | dict[str, str]) -> None:
     regions = {rim: "1"} if isinstance(rim, str) else rim
     for name in regions:
         if name not in valid:
-            raise SceneError(f"rim {name!r} does not exist; valid are {', '.join(valid)}")
+            raise SceneError(f"rim must be one of {', '.join(valid)}, got {name!r}")
     for where in regions.values():
         evaluate(where, dict.fromkeys("xyz", np.ones(0)))
 
@@ -238,8 +237,8 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
     mesh: str | None = None
     """Path of a mesh file, relative to the scene file."""
     volume: str | None = None
-    """Instead, path of a volume: NIfTI, NRRD, the folder of a DICOM series, or .npy. All but .npy need the package
-    SimpleITK."""
+    """Instead, path of a volume: NIfTI, NRRD, the folder of a DICOM series, or .npy. All but .npy
+    need the package SimpleITK."""
     threshold: float | None = None
     """Value of the volume at the body's surface."""
     spacing: float | None = None
@@ -259,14 +258,14 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
         """Raise `SceneError` where keys are missing, too many, or out of range."""
         if (self.mesh is None) == (self.volume is None):
             raise SceneError(
-                "a [[ripple.inside]] names neither or both of mesh and volume; valid is one of them"
+                "a [[ripple.inside]] must name a mesh or a volume, got neither or both"
             )
         _check_threshold(self.mesh or self.volume, self.mesh is None, self.threshold, self.spacing)
         for key, value in (("scale", self.scale), ("spacing", self.spacing)):
             if value is not None and not value > 0:
                 raise SceneError(
-                    f"the {key} of a [[ripple.inside]] is {value!r}; valid is a number greater "
-                    "than 0"
+                    f"the {key} of a [[ripple.inside]] must be a number greater than 0, got "
+                    f"{value!r}"
                 )
 
     def body(self) -> Mesh | Volume:

@@ -178,8 +178,8 @@ def check_options(options: VideoOptions, output: Path) -> None:
     )
     if options.sound and video_format(output) not in (".mp4", ".webm"):
         raise VideoError(
-            f"{output} has no sound; valid are .mp4 and .webm, or `ripple-sim export SCENE -o "
-            f"FILE.wav`"
+            f"{output} has no sound: write .mp4 or .webm, or use `ripple-sim export SCENE -o "
+            "FILE.wav`"
         )
     if options.sound and len(operators) > 1:
         raise VideoError("two runs side by side have no sound; leave out --sound or --compare")

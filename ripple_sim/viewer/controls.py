@@ -42,8 +42,8 @@ _MAX_ELEVATION = 88.0
 # name and unit of the first slider
 _POKE_SLIDER = {"poke": "N s"}
 
-# Left end of the first slider, distance between sliders, width of a slider, and its height above the
-# lower edge, as shares of the window's size.
+# Left end of the first slider, distance between sliders, width of a slider, and its height above
+# the lower edge, as shares of the window's size.
 _SLIDER_LEFT = 0.03
 _SLIDER_SPACING = 0.24
 _SLIDER_WIDTH = 0.2

@@ -66,7 +66,8 @@ _SHADOW_BIAS = 0.01
 _SHADOW_RINGS = 8
 _SHADOW_SIDES = 32
 
-# Bodies farther away than this, in distances of the first camera, wait for their turn and are hidden.
+# Bodies farther away than this, in distances of the first camera, wait for their turn and are
+# hidden.
 _REACH = 4.0
 
 
@@ -302,9 +303,19 @@ class Stage:
             self.shadows = Shadows(plotter, session, [*rigid, *self._bodies.solid], floor)
         first = next(iter(self.skins.values()))
         self._bar = plotter.add_scalar_bar(
-            HEIGHT, mapper=first.actor.mapper, vertical=True, position_x=0.9, position_y=0.2, width=0.06, height=0.4,
-            n_labels=3, fmt="%.3g", title_font_size=13, label_font_size=12, color="black",
-        )  # fmt: skip
+            HEIGHT,
+            mapper=first.actor.mapper,
+            vertical=True,
+            position_x=0.9,
+            position_y=0.2,
+            width=0.06,
+            height=0.4,
+            n_labels=3,
+            fmt="%.3g",
+            title_font_size=13,
+            label_font_size=12,
+            color="black",
+        )
         self._bar.SetVerticalTitleSeparation(10)
         self._bar.SetVisibility(self._heatmap)
         camera = plotter.camera

@@ -51,7 +51,8 @@ main { outline: none; margin: 0 auto; padding: 12px 0; box-sizing: border-box; h
   display: flex; flex-direction: column; }
 #picture { flex: 0 1 auto; min-height: 0; }
 nav { display: flex; flex-wrap: wrap; gap: 6px; margin-bottom: 8px; }
-button { font: inherit; padding: 4px 10px; border: 1px solid #667; border-radius: 4px; background: #eef0f3; }
+button { font: inherit; padding: 4px 10px; border: 1px solid #667; border-radius: 4px;
+  background: #eef0f3; }
 button:hover { background: #fff; }
 output { display: block; margin-top: 8px; white-space: pre; }
 """

@@ -115,8 +115,8 @@ class Window:
         iren.clear_key_event_callbacks()
         # keys are ours: the style's own ones end the program, draw wire frames and the like
         iren.style.AddObserver("CharEvent", lambda *_: None)
-        # A weak reference: PyVista keeps each plotter until it is closed, and the plotter of a deleted
-        # window must be closed.
+        # A weak reference: PyVista keeps each plotter until it is closed, and the plotter of a
+        # deleted window must be closed.
         me = weakref.proxy(self)
         iren.add_observer(
             "KeyPressEvent", lambda *_: me.key(me.plotter.iren.interactor.GetKeySym())

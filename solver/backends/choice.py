@@ -37,9 +37,7 @@ def make_backend(
         If "gl" is asked for and no context can be made.
     """
     if name not in BACKENDS:
-        raise SolverError(
-            f"backend {name!r} does not exist; valid are {', '.join(map(repr, BACKENDS))}"
-        )
+        raise SolverError(f"backend must be one of {', '.join(map(repr, BACKENDS))}, got {name!r}")
     if isinstance(operator, FluidOperator):
         return FluidBackend(operator, keeps_volume=keeps_volume)
     if name == "auto":

@@ -39,8 +39,9 @@ from .kernels import (
 from .meeting import alone
 from .surface_fields import SurfaceFields
 
-# Below this resolution [texels along a side] charts lie side by side, row by row: one loop then runs
-# over a row of all charts. On charts of 12 columns, a loop for each chart takes four times as long.
+# Below this resolution [texels along a side] charts lie side by side, row by row: one loop then
+# runs over a row of all charts. On charts of 12 columns, a loop for each chart takes four times as
+# long.
 _MAX_JOINED_RESOLUTION = 64
 
 _LINE_FLOATS = 16  # float32 in a cache line of 64 bytes

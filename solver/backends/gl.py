@@ -187,9 +187,9 @@ class StencilBuffer:
     def write(self, stencil: Stencil, mass: NDArray[np.float64]) -> None:
         """Take over another stencil of the same topology.
 
-        The GPU computes it where texels lie on their triangles, and no texel lies on two. Else it is
-        uploaded; so it is with a software driver, whose shaders run on the processor's own cores:
-        the CPU's loops take a fifth of their time.
+        The GPU computes it where texels lie on their triangles, and no texel lies on two. Else it
+        is uploaded; so it is with a software driver, whose shaders run on the processor's own
+        cores: the CPU's loops take a fifth of their time.
         """
         if (
             isinstance(stencil, MovedStencil)

@@ -154,8 +154,8 @@ def is_software(renderer: str) -> bool:
 def _spare_full_disks() -> None:
     """Switch Mesa's shader cache off where its disk is nearly full, or its folder cannot be made.
 
-    The cache is mapped into memory: a page without room on the disk kills the process. A folder that
-    cannot be made makes Mesa complain on standard error.
+    The cache is mapped into memory: a page without room on the disk kills the process. A folder
+    that cannot be made makes Mesa complain on standard error.
     """
     names = ("MESA_SHADER_CACHE_DIR", "MESA_GLSL_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
     folder = Path(next((os.environ[name] for name in names if os.environ.get(name)), "/"))
@@ -169,9 +169,9 @@ def _spare_full_disks() -> None:
 def _draw_without_threads() -> None:
     """Have Mesa's llvmpipe draw in the calling thread, unless the user set the number of threads.
 
-    llvmpipe reads the variable when its first context is made. One of its threads may unlock a fence
-    that another thread has freed: this writes into the program's memory, and glibc ends the program
-    ("corrupted unsorted chunks"). See docs/stability.md. Other drivers ignore the variable.
+    llvmpipe reads the variable when its first context is made. One of its threads may unlock a
+    fence that another thread has freed: this writes into the program's memory, and glibc ends the
+    program ("corrupted unsorted chunks"). See docs/stability.md. Other drivers ignore the variable.
     """
     os.environ.setdefault(DRAWING_THREADS, "0")
 
@@ -256,8 +256,8 @@ class GLContext:
     enter: one at a time, other threads wait.
 
     Python collects objects at any time, in any thread, also in the middle of a frame. So finalizers
-    do not call OpenGL: they `discard` objects, which are freed when the context is next entered from
-    outside.
+    do not call OpenGL: they `discard` objects, which are freed when the context is next entered
+    from outside.
 
     Parameters
     ----------
@@ -457,8 +457,8 @@ class GLContext:
     def flush(self) -> None:
         """Have a software driver draw all commands so far, without blocking other Python threads.
 
-        Otherwise a software driver draws a pass when the next pass begins, in a call of moderngl that
-        holds the interpreter's lock. Other drivers begin on their own.
+        Otherwise a software driver draws a pass when the next pass begins, in a call of moderngl
+        that holds the interpreter's lock. Other drivers begin on their own.
         """
         if self.software:
             self._flush()
@@ -525,11 +525,11 @@ class GLContext:
         See `load_shader`. An idle program of the same text is taken instead, with its uniforms as
         after compilation.
 
-        `VARYING` declares a value that the vertex stage passes to the fragment stage: it is `out` in
-        the one and `in` in the other. With `captured`, names of outputs of the vertex stage, there is
-        no fragment stage, and transform feedback captures these outputs. A shader may give `binding =
-        N` to its samplers and uniform blocks, each of which has a name of its own. GLSL knows
-        bindings from 4.2 on; here they are set for older versions.
+        `VARYING` declares a value that the vertex stage passes to the fragment stage: it is `out`
+        in the one and `in` in the other. With `captured`, names of outputs of the vertex stage,
+        there is no fragment stage, and transform feedback captures these outputs. A shader may give
+        `binding = N` to its samplers and uniform blocks, each of which has a name of its own. GLSL
+        knows bindings from 4.2 on; here they are set for older versions.
         """
         stages = {"vertex": "out"} if captured else {"vertex": "out", "fragment": "in"}
         texts = [

@@ -157,7 +157,7 @@ def build_atlas(
 
 def _check_name(kind: str, name: str, valid: tuple[str, ...]) -> None:
     if name not in valid:
-        raise AtlasError(f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}")
+        raise AtlasError(f"{kind} must be one of {', '.join(map(repr, valid))}, got {name!r}")
 
 
 @dataclasses.dataclass(frozen=True)

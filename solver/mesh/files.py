@@ -114,7 +114,8 @@ def _read(path: Path) -> Soup:
             return _READERS[ending](path.read_bytes())
         if kind.lower() not in trimesh.available_formats() or kind.lower() in _ARCHIVES:
             raise MeshError(
-                f"{file} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb, unpacked"
+                f"{file} has an unknown ending: mesh files must end in .obj, .off, .ply, .stl "
+                "or .glb, unpacked"
             )
         if ending == ".gltf":
             _check_buffers(path)
@@ -171,7 +172,7 @@ def _parts(scene: trimesh.Scene) -> Soup:
             continue
         if triangles.min() < 0 or triangles.max() >= len(vertices):
             raise MeshError(
-                f"a triangle refers to vertex {triangles.max()}; valid is 0 to {len(vertices) - 1}"
+                f"the vertices of triangles must be 0 to {len(vertices) - 1}, got {triangles.max()}"
             )
         uv = np.asarray(getattr(part.visual, "uv", None), dtype=np.float64)
         if uv.shape == (len(vertices), 2):

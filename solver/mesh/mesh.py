@@ -268,7 +268,7 @@ def _checked(
         points = np.asarray(V, dtype=np.float64)
         triangles = np.asarray(F)
         if triangles.dtype.kind not in "iu":
-            raise TypeError(f"F holds {triangles.dtype}, valid are integers")
+            raise TypeError(f"F must hold integers, got {triangles.dtype}")
         triangles = triangles.astype(np.int64)
     except (TypeError, ValueError) as error:
         raise MeshError(f"{name}: V and F must be arrays of numbers: {error}") from error
@@ -287,7 +287,7 @@ def _checked(
     high = triangles.max()
     if low < 0 or high >= len(points):
         raise MeshError(
-            f"{name}: triangle indices run from {low} to {high}, valid is 0 to {len(points) - 1}"
+            f"{name}: triangle indices must be 0 to {len(points) - 1}, got {low} to {high}"
         )
     used = distinct(triangles)
     bad = used[~np.isfinite(points[used]).all(axis=1)]
@@ -299,14 +299,14 @@ def _checked(
         extent = np.ptp(points[used], axis=0).max()
     if not _MIN_SIZE <= extent <= _MAX_SIZE:
         raise MeshError(
-            f"{name}: its size is {extent:.3g} m; valid is {_MIN_SIZE:g} to {_MAX_SIZE:g} m"
+            f"{name}: its size must be {_MIN_SIZE:g} to {_MAX_SIZE:g} m, got {extent:.3g} m"
         )
     if uv is None:
         return points, triangles, None
     pairs = np.asarray(uv, dtype=np.float64)
     valid = (len(points), 2), (*triangles.shape, 2)
     if pairs.shape not in valid:
-        raise MeshError(f"{name}: uv has shape {pairs.shape}; valid is {valid[0]} or {valid[1]}")
+        raise MeshError(f"{name}: uv must have shape {valid[0]} or {valid[1]}, got {pairs.shape}")
     return points, triangles, pairs[triangles] if pairs.ndim == 2 else pairs
 
 
@@ -386,7 +386,7 @@ def check_genus_zero(mesh: Mesh) -> None:
     parts = mesh.component_count
     if parts > 1:
         defects.append(
-            f"in {parts:,} separate parts (valid is one; keep the part you want, or join them)"
+            f"in {parts:,} separate parts (it must be in one; keep the part you want, or join them)"
         )
     if not mesh.closed:
         edges = sum(len(rim) for rim in mesh.rims)
@@ -398,7 +398,7 @@ def check_genus_zero(mesh: Mesh) -> None:
         advice = "; repair (--repair) closes holes"
     handles = int(mesh.genus.sum())
     if parts == 1 and handles:
-        defects.append(f"of genus {handles} (valid is genus 0: no handles or tunnels)")
+        defects.append(f"of genus {handles} (it must be of genus 0, without handles or tunnels)")
     if many_parts(mesh):
         advice = f"; {many_parts(mesh)}"
     if defects:

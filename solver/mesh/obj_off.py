@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from .soup import Soup, too_small, triangulate
 
-# A corner of a face in an OBJ file: vertex, vertex/texture, vertex//normal or vertex/texture/normal.
+# A corner of a face in an OBJ file: vertex, vertex/texture, vertex//normal or
+# vertex/texture/normal.
 _CORNER = re.compile(r"(-?\d{1,15})(?:/(-?\d{1,15})?(?:/(?:-?\d+)?)?)?", flags=re.ASCII)
 
 # A whole number that fits an int64.
@@ -37,8 +38,8 @@ def read_obj(content: bytes) -> Soup:
         first_wrong = np.argmax(wrong)
         number = np.repeat(statements.face_lines, statements.face_sizes)[first_wrong]
         raise MeshError(
-            f"line {number} refers to vertex {vertex[first_wrong] + 1}; valid is 1 to {len(V)}, "
-            f"the vertices given"
+            f"line {number} refers to vertex {vertex[first_wrong] + 1}: it must be one of the "
+            f"vertices given, 1 to {len(V)}"
         )
     sizes = np.array(statements.face_sizes, dtype=np.int64)
     triangles = triangulate(V[vertex], sizes)
@@ -166,8 +167,8 @@ def _corner(word: str, vertices: int, pairs: int, line: int) -> tuple[int, int]:
     match = _CORNER.fullmatch(word)
     if match is None:
         raise MeshError(
-            f"line {line}: {word[:40]!r} is not a corner of a face; valid are 3, 3/1, 3//2 and "
-            f"3/1/2, for example"
+            f"line {line}: a corner of a face must be written like 3, 3/1, 3//2 or 3/1/2, got "
+            f"{word[:40]!r}"
         )
     vertex = int(match[1])
     vertex = vertex - 1 if vertex >= 0 else vertices + vertex
@@ -179,7 +180,7 @@ def _corner(word: str, vertices: int, pairs: int, line: int) -> tuple[int, int]:
 def _three(words: Sequence[str], number: int, unit: str = "line") -> Sequence[str]:
     """The first three words; `unit` and `number` say in the message where they stand."""
     if len(words) < 3:
-        raise MeshError(f"{unit} {number} has {len(words)} coordinates; valid are 3")
+        raise MeshError(f"{unit} {number} must have 3 coordinates, got {len(words)}")
     return words[:3]
 
 

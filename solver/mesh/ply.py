@@ -175,8 +175,8 @@ def read_ply(content: bytes) -> Soup:
     corners = np.concatenate([np.empty(0), *polygons])
     if len(corners) and not (corners.min() >= 0 and corners.max() < len(V)):
         raise MeshError(
-            f"its faces refer to vertices {corners.min():g} to {corners.max():g}; valid is 0 to "
-            f"{len(V) - 1}"
+            f"the vertices of faces must be 0 to {len(V) - 1}, got {corners.min():g} to "
+            f"{corners.max():g}"
         )
     index = corners.astype(np.int64)
     triangles = triangulate(V[index], sizes)

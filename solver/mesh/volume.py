@@ -61,20 +61,18 @@ class Volume:
         spacing = np.broadcast_to(np.asarray(self.spacing, dtype=np.float64), 3)
         if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
             raise MeshError(
-                f"a volume has shape {values.shape}; valid are finite numbers [i, j, k], two or "
-                f"more along each side"
+                "a volume must hold finite numbers [i, j, k], two or more along each side, got "
+                f"shape {values.shape}"
             )
         if not (spacing > 0).all() or not is_finite(self.threshold):
             raise MeshError(
-                f"a volume has spacing {shown(self.spacing)} m and threshold "
-                f"{shown(self.threshold)}; valid are finite "
-                "numbers, the spacing greater than 0"
+                "a volume's spacing and threshold must be finite numbers, the spacing greater "
+                f"than 0, got {shown(self.spacing)} m and {shown(self.threshold)}"
             )
         if not values.min() < self.threshold < values.max():
             raise MeshError(
-                f"the volume's values are from {values.min():g} to {values.max():g}; valid is a "
-                f"threshold between, not "
-                f"{self.threshold:g}"
+                f"the threshold must lie between the volume's values, {values.min():g} to "
+                f"{values.max():g}, got {self.threshold:g}"
             )
         V, F = zero_surface(self.threshold - values, np.zeros(3), spacing)
         directions = np.asarray(self.directions, dtype=np.float64)
@@ -120,12 +118,13 @@ def load_volume(
     path = Path(path)
     if not path.exists():
         raise MeshError(
-            f"volume {str(path)!r} does not exist; valid are {', '.join(VOLUME_ENDINGS)}, or a "
-            f"folder"
+            f"volume {str(path)!r} does not exist: it must be a folder or a file that ends in "
+            f"{', '.join(VOLUME_ENDINGS)}"
         )
     if not is_volume(path):
         raise MeshError(
-            f"volume {str(path)!r} has an unknown ending; valid are {', '.join(VOLUME_ENDINGS)}"
+            f"volume {str(path)!r} has an unknown ending: it must end in "
+            f"{', '.join(VOLUME_ENDINGS)}"
         )
     if path.suffix.lower() != ".npy":
         if spacing is not None:
@@ -142,7 +141,7 @@ def load_volume(
     except (OSError, ValueError, EOFError) as error:
         raise MeshError(f"volume {str(path)!r} cannot be read: {error}") from error
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "iuf":
-        raise MeshError(f"volume {str(path)!r} holds no numbers; valid is an array [i, j, k]")
+        raise MeshError(f"volume {str(path)!r} must hold an array of numbers [i, j, k]")
     return Volume(values, threshold, spacing, origin)
 
 
@@ -172,9 +171,8 @@ def _scan(path: Path, threshold: float) -> Volume:
         raise MeshError(f"volume {str(path)!r} cannot be read: {reason}") from error
     if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1:
         raise MeshError(
-            f"volume {str(path)!r} has {image.GetDimension()} dimensions and "
-            f"{image.GetNumberOfComponentsPerPixel()} "
-            "values a voxel; valid are 3 and 1"
+            f"volume {str(path)!r} must have 3 dimensions and 1 value a voxel, got "
+            f"{image.GetDimension()} and {image.GetNumberOfComponentsPerPixel()}"
         )
     return Volume(
         itk.GetArrayFromImage(image).T,

@@ -162,8 +162,8 @@ def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
 
     if not _MIN_OFFSET <= offset <= _MAX_OFFSET:
         raise MeshError(
-            f"the offset of the wrap is {offset}; valid is {_MIN_OFFSET} to {_MAX_OFFSET} of the "
-            f"object's size"
+            f"the offset of the wrap must be {_MIN_OFFSET} to {_MAX_OFFSET} of the object's "
+            f"size, got {offset}"
         )
     distance = float(offset * np.ptp(mesh.V, axis=0).max())  # [m]
     values, origin = distance_grid(mesh.V, mesh.F, distance)

@@ -133,11 +133,11 @@ def _check_kind(kind: str, rim: Rim) -> None:
     """Raise `SolverError` for an unknown kind of operator, or rims by region for a baseline."""
     if kind not in OPERATORS:
         raise SolverError(
-            f"operator {kind!r} does not exist; valid are {', '.join(map(repr, OPERATORS))}"
+            f"operator must be one of {', '.join(map(repr, OPERATORS))}, got {kind!r}"
         )
     if kind != "fem" and not isinstance(rim, str):
         raise SolverError(
-            f"the operator {kind!r} has no rims by region; valid is one name for all of the rim"
+            f"the rim must be one name for the operator {kind!r}, which has no rims by region"
         )
 
 

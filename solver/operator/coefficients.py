@@ -39,8 +39,8 @@ def check_numbers(name: str, value: ArrayLike) -> None:
         bound = f"greater than 0 and at least {least:g}" if must_be_positive else "0 or greater"
         infinity = ", or infinity" if may_be_infinite else ""
         raise SolverError(
-            f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to "
-            f"{_HIGHEST:g}{infinity}"
+            f"material {name} must be a finite number, {bound}, up to {_HIGHEST:g}{infinity}, "
+            f"got {worst:g} {unit}"
         )
     _check_shape(name, numbers)
 
@@ -50,7 +50,7 @@ def check_mask(name: str, value: ArrayLike) -> None:
     mask = np.asarray(value)
     if mask.dtype != bool:
         raise SolverError(
-            f"material {name} has type {mask.dtype}; valid is bool: a mask [C, n, n], or False"
+            f"material {name} must be False or a bool mask [C, n, n], got type {mask.dtype}"
         )
     _check_shape(name, mask)
 
@@ -60,8 +60,8 @@ def check_wavelengths(value: ArrayLike) -> None:
     numbers = _numbers("wavelengths", value)
     if numbers.shape != (2,) or not 0 <= numbers[0] <= numbers[1]:
         raise SolverError(
-            f"material wavelengths is {shown(value)} m; valid are two numbers: the shortest, 0 or "
-            "greater, and the longest"
+            "material wavelengths must be two numbers, the shortest (0 or greater) and the "
+            f"longest, got {shown(value)} m"
         )
 
 
@@ -70,7 +70,7 @@ def _numbers(name: str, value: object) -> NDArray[np.float64]:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise SolverError(
-            f"material {name} is {shown(value)}; valid is a number or an array of numbers"
+            f"material {name} must be a number or an array of numbers, got {shown(value)}"
         ) from error
 
 
@@ -78,8 +78,8 @@ def _check_shape(name: str, value: NDArray) -> None:
     is_field = value.ndim == 3 and value.shape[1] == value.shape[2]
     if value.ndim != 0 and not is_field:
         raise SolverError(
-            f"material {name} has shape {value.shape}; valid is a number or [C, n, n], one value a "
-            "texel"
+            f"material {name} must be a number or have shape [C, n, n], one value a texel, got "
+            f"shape {value.shape}"
         )
 
 
@@ -90,4 +90,4 @@ def require_positive(**values: tuple[float, str]) -> None:
     """
     for name, (value, unit) in values.items():
         if not POSITIVE.holds(value):
-            raise SolverError(f"{name} is {shown(value)} {unit}; valid is {POSITIVE.words}")
+            raise SolverError(f"{name} must be {POSITIVE.words}, got {shown(value)} {unit}")

@@ -173,7 +173,8 @@ def over_fluid(
     for property_name, value in excluded.items():
         if value is not None:
             raise SolverError(
-                f"a material with deep fluid has {property_name}; valid is one density alone"
+                "a material with deep fluid must have one density and neither bending nor a "
+                f"yield height, got {property_name}"
             )
     fields = {field.name: getattr(operator, field.name) for field in dataclasses.fields(operator)}
     return FluidOperator(**fields, deep=deep, geometry=geometry, areas=areas)

@@ -20,14 +20,15 @@ from .presets import PRESETS
 from .suited_law import suited_coefficients
 
 # A layer has omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2. This is the even fit, for 1.3 <= q d
-# <= 8, to the lowest normal mode of an incompressible layer bonded to a rigid base. Its frequency is
-# within 3.0 % of the root of the mode's determinant. Its group speed is not: it is 0.36 c_T instead
-# of 0.93 at q d = 1.3, 0.53 for 0.38 at 2.2, and 0.82 for 0.93 at 8.
+# <= 8, to the lowest normal mode of an incompressible layer bonded to a rigid base. Its frequency
+# is within 3.0 % of the root of the mode's determinant. Its group speed is not: it is 0.36 c_T
+# instead of 0.93 at q d = 1.3, 0.53 for 0.38 at 2.2, and 0.82 for 0.93 at 8.
 STIFF = 6.527
 FAST = 0.7668
 
 # The kinetic energy of the mode is that of a mass MASS rho d that moves as the surface does. In the
-# range of the fit the factor is 0.56 to 0.95, the least for short waves; this is the geometric mean.
+# range of the fit the factor is 0.56 to 0.95, the least for short waves; this is the geometric
+# mean.
 MASS = 0.665
 
 # Shortest and longest wave, over the thickness, for which the fit holds.
@@ -48,8 +49,8 @@ _SHORT_LONGEST = 2 * np.pi / 5
 # Greatest power with which tension may follow the area, either way.
 _MOST_TIGHTENING = 8.0
 
-# Least Poisson's ratio. At -1 a sheet would resist only changes of its shape, and its rigidity would
-# be infinite.
+# Least Poisson's ratio. At -1 a sheet would resist only changes of its shape, and its rigidity
+# would be infinite.
 _LEAST_POISSON = -0.9
 
 # Texels of the shortest wave that is solved well: a shorter one is slower than it should be by more
@@ -142,16 +143,16 @@ class Material:
         check_mask("fixed", self.fixed)
         if not (is_finite(self.tightening) and abs(self.tightening) <= _MOST_TIGHTENING):
             raise SolverError(
-                f"material tightening is {shown(self.tightening)}; valid is from "
-                f"{-_MOST_TIGHTENING:g} to {_MOST_TIGHTENING:g}"
+                f"material tightening must be a number from {-_MOST_TIGHTENING:g} to "
+                f"{_MOST_TIGHTENING:g}, got {shown(self.tightening)}"
             )
         if not (is_finite(self.poisson) and _LEAST_POISSON <= self.poisson <= 0.5):
             raise SolverError(
-                f"material poisson is {shown(self.poisson)}; valid is a number from "
-                f"{_LEAST_POISSON} to 0.5"
+                f"material poisson must be a number from {_LEAST_POISSON} to 0.5, got "
+                f"{shown(self.poisson)}"
             )
         if np.ndim(self.deep):
-            raise SolverError(f"material deep has shape {np.shape(self.deep)}; valid is one number")
+            raise SolverError(f"material deep must be one number, got shape {np.shape(self.deep)}")
         check_wavelengths(self.wavelengths)
 
     @property
@@ -231,7 +232,7 @@ class Material:
         require_positive(modulus=(modulus, "Pa"), density=(density, "kg/m^3"))
         if not (is_finite(viscosity) and viscosity >= 0):
             raise SolverError(
-                f"viscosity is {shown(viscosity)} Pa s; valid is a finite number, 0 or greater"
+                f"viscosity must be a finite number, 0 or greater, got {shown(viscosity)} Pa s"
             )
         depth = _thickness(thickness)
         square = modulus / density
@@ -446,16 +447,15 @@ class Material:
             For an unknown name or parameter.
         """
         if not isinstance(name, str) or name not in PRESETS:
-            raise SolverError(
-                f"the preset {shown(name)} does not exist; valid are {', '.join(PRESETS)}"
-            )
+            raise SolverError(f"preset must be one of {', '.join(PRESETS)}, got {shown(name)}")
         chosen = PRESETS[name]
         law = getattr(cls, chosen.law)
         valid = inspect.signature(law).parameters
         unknown = [key for key in parameters if key not in valid]
         if unknown:
             raise SolverError(
-                f"the preset {name!r} has no parameter {unknown[0]!r}; valid are {', '.join(valid)}"
+                f"the preset {name!r} has no parameter {unknown[0]!r}; its parameters are "
+                f"{', '.join(valid)}"
             )
         return law(**{**chosen.parameters, **parameters})
 
@@ -471,7 +471,8 @@ def _thickness(value: Any) -> float | NDArray[np.float64]:
     if wrong.any():
         worst = depth.tolist() if depth.size == 0 else depth.flat[np.argmax(wrong)].item()
         raise SolverError(
-            f"thickness is {shown(worst)} m; valid is {POSITIVE.words}, or one at every texel"
+            f"thickness must be {POSITIVE.words}, or one such number at every texel, got "
+            f"{shown(worst)} m"
         )
     return depth.astype(np.float64)
 
@@ -517,7 +518,8 @@ def warn_of_wavelengths(atlas: Atlas, material: Material) -> None:
         resolution = int(np.ceil(np.sqrt(areas.size / 6) * finest / longest))
         message = (
             f"the material holds for waves up to {longest:.3g} m, and texels of {texel:.2g} m "
-            f"carry none below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer"
+            f"carry none below {finest:.3g} m; take a resolution of {resolution}, or a thicker "
+            "layer"
         )
     elif shortest > whole:
         message = (

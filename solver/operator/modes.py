@@ -96,7 +96,7 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
     most = int(np.pi * len(moving) / SHORTEST_TEXELS**2)  # by Weyl's law
     if not (isinstance(count, numbers.Integral) and 1 <= count <= most):
         raise SolverError(
-            f"count of modes is {shown(count)}; valid is a whole number from 1 to {most}: of "
+            f"count of modes must be a whole number from 1 to {most}, got {shown(count)}: of "
             f"{len(moving):,} texels that move, further modes have waves of fewer than "
             f"{SHORTEST_TEXELS:g}; take a finer atlas for more"
         )

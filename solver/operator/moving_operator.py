@@ -1,6 +1,7 @@
 """The wave operator on a surface that moves.
 
-The masses of the texels stay as they are at rest; the stiffness follows the positions of the texels.
+The masses of the texels stay as they are at rest; the stiffness follows the positions of the
+texels.
 """
 
 from __future__ import annotations

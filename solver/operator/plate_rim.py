@@ -25,8 +25,8 @@ CLAMPED = 3
 # whether the point is clamped rather than free.
 Rim: TypeAlias = str | Callable[[NDArray[np.float64]], ArrayLike]
 
-# The four sides of a chart: the slice of the halo that lies beyond each side, and that of the texels
-# along the side.
+# The four sides of a chart: the slice of the halo that lies beyond each side, and that of the
+# texels along the side.
 _SIDES = (
     (np.s_[:, 0, 1:-1], np.s_[:, 0]),
     (np.s_[:, 1:-1, -1], np.s_[:, :, -1]),
@@ -45,17 +45,18 @@ def rim_conditions(texels: TexelMesh, rim: Rim) -> NDArray[np.int8]:
     SolverError
         For an unknown name, or a function whose result is neither a name nor a bool for each point.
     """
-    valid = f"valid are {', '.join(map(repr, RIMS))}"
+    valid = ", ".join(map(repr, RIMS))
     conditions = np.zeros(texels.topology.halo.shape, np.int8)
     at = texels.topology.rim
     if isinstance(rim, str):
         if rim not in RIMS:
-            raise SolverError(f"rim {rim!r} does not exist; {valid}")
+            raise SolverError(f"rim must be one of {valid}, got {rim!r}")
         conditions[at] = RIMS.index(rim) + 1 if rim != "fixed" else SUPPORTED
         return conditions
     if not callable(rim):
         raise SolverError(
-            f"rim {shown(rim)} is no name; {valid}, or a function of points [k, 3] that gives them"
+            f"rim must be one of {valid}, or a function of points [k, 3] that returns such names, "
+            f"got {shown(rim)}"
         )
     points = texels.halo_positions[at]
     shown_points = texels.positions.reshape(-1, 3)[texels.topology.halo[at]]
@@ -72,17 +73,17 @@ def _rim_names(rim: Callable[[Floats], ArrayLike], points: Floats) -> NDArray[np
     names = np.asarray(rim(points))
     if names.shape != (len(points),) or names.dtype.kind not in "bU":
         raise SolverError(
-            f"the function of the rim gives {names.dtype} of shape {names.shape} for {len(points)} "
-            "points; valid are a name or a bool for each: 'free', 'supported' or 'clamped', or "
-            "whether it is clamped"
+            f"the function of the rim must give a name or a bool for each of {len(points)} "
+            "points ('free', 'supported' or 'clamped', or whether it is clamped), got "
+            f"{names.dtype} of shape {names.shape}"
         )
     if names.dtype.kind == "b":
         names = np.where(names, "clamped", "free")
     wrong = names[~np.isin(names, RIMS[:3])]
     if len(wrong):
         raise SolverError(
-            f"the function of the rim gives {str(wrong[0])!r}; valid are 'free', 'supported', "
-            "'clamped'"
+            "the function of the rim must give 'free', 'supported' or 'clamped', got "
+            f"{str(wrong[0])!r}"
         )
     return names
 

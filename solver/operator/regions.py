@@ -63,21 +63,22 @@ def absorbing_damping(
     shape = atlas.areas.shape
     if mask.dtype != bool or mask.shape != shape:
         raise SolverError(
-            f"absorbing region has type {mask.dtype} and shape {mask.shape}; valid is bool, {shape}"
+            f"absorbing region must be bool of shape {shape}, got {mask.dtype} of shape "
+            f"{mask.shape}"
         )
     if mask.all() or not mask.any():
         raise SolverError(
-            f"absorbing region holds {mask.sum()} of {mask.size} texels; valid is some, but not all"
+            f"absorbing region must hold some texels and not all, got {mask.sum()} of {mask.size}"
         )
     if not 0 < reflection < 1:
-        raise SolverError(f"reflection is {reflection!r}; valid is a number between 0 and 1")
+        raise SolverError(f"reflection must be a number between 0 and 1, got {reflection!r}")
     if not 0 < speed < np.inf:
-        raise SolverError(f"speed is {speed!r} m/s; valid is a finite number greater than 0")
+        raise SolverError(f"speed must be a finite number greater than 0, got {speed!r} m/s")
     depth = depth_in_region(atlas.texels, mask)
     if width is None:
         width = float(depth.max())
     if not 0 < width < np.inf:
-        raise SolverError(f"width is {width!r} m; valid is a finite number greater than 0")
+        raise SolverError(f"width must be a finite number greater than 0, got {width!r} m")
     greatest = 3 * speed * np.log(1 / reflection) / width  # [1/s]
     return greatest * np.minimum(depth / width, 1) ** 2
 
@@ -112,10 +113,10 @@ def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
     """
     share = np.asarray(region, dtype=np.float64)
     if share.shape != atlas.areas.shape:
-        raise SolverError(f"held region has shape {share.shape}; valid is {atlas.areas.shape}")
+        raise SolverError(f"held region must have shape {atlas.areas.shape}, got {share.shape}")
     if not ((share >= 0) & (share <= 1)).all():
         raise SolverError(
-            "held region has shares below 0, above 1 or NaN; valid are numbers from 0 to 1"
+            "shares of the held region must be numbers from 0 to 1, got one below 0, above 1 or NaN"
         )
     share = np.clip(smoothed(atlas.texels.topology, share) / _WHOLLY_HELD, 0, 1)
     shape = atlas.areas.shape

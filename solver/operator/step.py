@@ -54,8 +54,8 @@ def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
         )
     if not all(np.isfinite(value).all() for value in (kick.gain, kick.spring, kick.span)):
         raise SolverError(
-            f"a substep of {dt:.4g} s on texels of {operator.mass.min():.4g} kg and more is beyond "
-            "float32; valid is a shorter step, or a larger mesh or material density"
+            f"a substep of {dt:.4g} s on texels of {operator.mass.min():.4g} kg and more is "
+            "beyond float32: take a shorter step, or a larger mesh or material density"
         )
     return kick
 

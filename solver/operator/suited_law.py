@@ -40,8 +40,8 @@ _VISCOSITY = 1e-3
 # [m/s^2]
 _GRAVITY = 9.81
 
-# Ratio of the load that tension bears to the load below which tension bears nothing, and above which
-# it bears everything, so that no stiffness is needed.
+# Ratio of the load that tension bears to the load below which tension bears nothing, and above
+# which it bears everything, so that no stiffness is needed.
 _SLACK_RATIO = 1e-9
 _STIFF_RATIO = 100
 
@@ -167,7 +167,7 @@ def _impulse_and_mass(hit: float | tuple[float, float]) -> tuple[float, float]:
         return hit, 0.0
     if len(hit) != 2:
         raise SolverError(
-            f"hit is {hit!r}; valid is an impulse [N s], or a mass [kg] and a speed [m/s]"
+            f"hit must be an impulse [N s], or a mass [kg] and a speed [m/s], got {hit!r}"
         )
     mass, velocity = hit
     require_positive(**{"mass of the hit": (mass, "kg"), "speed of the hit": (velocity, "m/s")})

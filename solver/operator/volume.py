@@ -29,7 +29,7 @@ def kept_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
     """
     if conserve not in (None, True, False):
         raise SolverError(
-            f"conserve_volume is {shown(conserve)}; it must be True, False or None, the default"
+            f"conserve_volume must be True, False or None (the default), got {shown(conserve)}"
         )
     kept = operator.keeps_volume
     return kept if conserve is None else np.full_like(kept, conserve)

@@ -58,13 +58,13 @@ PER_HOURGLASS = np.float32(2.5)
 SHARE = np.float32(0.75)
 
 # A quad counts as uneven where the middles of its diagonals are further apart than the root of one
-# over this, in units of the diagonals. In an even quad the hourglass share of linear functions is of
-# second order, and makes up for some of the lag of waves: on the sphere N = 64 is a third more exact
-# with it.
+# over this, in units of the diagonals. In an even quad the hourglass share of linear functions is
+# of second order, and makes up for some of the lag of waves: on the sphere N = 64 is a third more
+# exact with it.
 EVEN = np.float32(1000)
 
-# Least area of a cell, in units of the area of a square of its size: a cell that is folded to a line
-# would need an infinitely short time step.
+# Least area of a cell, in units of the area of a square of its size: a cell that is folded to a
+# line would need an infinitely short time step.
 LEAST_AREA = np.float32(0.02)
 
 # Detours fade out in quads where |p|^2 |q|^2 - (p.q)^2 is below this share of |p|^2 |q|^2, with

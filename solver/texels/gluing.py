@@ -33,8 +33,8 @@ def close_corners(glued: Ints, n: int, halo: Ints, rim: Bools) -> tuple[Ints, In
         if closed and count == QUAD:
             halo[place] = texels[2]
         elif not closed and count <= 2:
-            # on a straight rim: the place beyond it shows the texel that the chart on the other side
-            # of the corner has beside it
+            # on a straight rim: the place beyond it shows the texel that the chart on the other
+            # side of the corner has beside it
             halo[place] = texels[(fan.index((chart, corner)) + 1) % count]
             rim[place] = True
         elif count > (TRIANGLE if closed else 2) and (chart, corner) == min(fan):
@@ -82,8 +82,8 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
     glued = np.asarray(glued, dtype=np.int64)
     if glued.ndim != 3 or glued.shape[1:] != (4, 2) or not len(glued):
         raise AtlasError(
-            f"the table of glued sides has shape {glued.shape}; valid is [C, 4, 2]: chart and side "
-            "beyond each"
+            "the table of glued sides must have shape [C, 4, 2], the chart and the side beyond "
+            f"each side, got {glued.shape}"
         )
     for chart, side in np.argwhere(glued[..., 0] >= 0).tolist():
         other, back = glued[chart, side].tolist()

@@ -38,7 +38,7 @@ def vertex_map(atlas: Atlas, values: ArrayLike) -> NDArray[np.float64]:
     values = np.asarray(values, dtype=np.float64)
     if values.ndim not in (1, 2) or len(values) != len(atlas.mesh.V):
         raise SolverError(
-            f"vertex values have shape {values.shape}; valid is [{len(atlas.mesh.V)}], one a vertex"
+            f"vertex values must have shape [{len(atlas.mesh.V)}], one a vertex, got {values.shape}"
         )
     return _interpolate(atlas, values[atlas.mesh.F])
 
@@ -122,14 +122,14 @@ def _pixels(image: str | Path | ArrayLike, channel: str) -> NDArray[np.float64]:
         pixels = pixels[..., None]
     if pixels.ndim != 3 or 0 in pixels.shape or pixels.shape[2] > 4:
         raise SolverError(
-            f"image has shape {pixels.shape}; valid is [height, width] with up to 4 channels"
+            f"image must have shape [height, width] with up to 4 channels, got {pixels.shape}"
         )
     channels = pixels.shape[2]
     if channel == "luminance":
         return pixels[..., : 3 if channels >= 3 else 1].mean(axis=2)
     if channel not in _CHANNELS:
         raise SolverError(
-            f"channel {channel!r} does not exist; valid are {', '.join(map(repr, CHANNELS))}"
+            f"channel must be one of {', '.join(map(repr, CHANNELS))}, got {channel!r}"
         )
     place = channels - 1 if channel == "alpha" and channels in (2, 4) else _CHANNELS[channel]
     if place >= channels:

@@ -68,8 +68,8 @@ class SurfaceRide:
         self._shift = shift[self._images].T
         self.corners = corners.astype(np.int32)
         self.weights = weights
-        # ways from the triangles to the places: along the first side of the triangle, across it, and
-        # along its normal, in units of the root of twice its area
+        # ways from the triangles to the places: along the first side of the triangle, across it,
+        # and along its normal, in units of the root of twice its area
         self._offsets = np.zeros((0, 3))
         off = np.nan_to_num(places - shift - np.einsum("ij,ijk->ik", weights, V[corners]))
         if np.abs(off).max(initial=0.0) > _OFF_TRIANGLE * np.ptp(V, axis=0).max():

@@ -55,8 +55,8 @@ def parts_mesh(chart_map: ChartMap, mesh: Mesh) -> PartsMesh:
     points = np.einsum("pij,pjk->pik", barycentrics, mesh.V[mesh.F[triangle]])
     step = np.ldexp(1.0, np.frexp(np.abs(mesh.V).max())[1] - _BITS)
     place = np.rint(points / step).astype(np.int64).reshape(-1, 3)
-    # the element of the mesh on which each corner lies: the two ends of an edge, one vertex twice, or
-    # a triangle and -1; so sheets that touch have points of their own
+    # the element of the mesh on which each corner lies: the two ends of an edge, one vertex twice,
+    # or a triangle and -1; so sheets that touch have points of their own
     counts = barycentrics > _ON_SIDE
     corners = np.broadcast_to(mesh.F[triangle][:, None], counts.shape)
     inside = counts.all(axis=2)

@@ -12,11 +12,13 @@ from .cells import quad
 # Least area of a cell over its area at rest: no density grows beyond a thousand times that at rest.
 LEAST_RATIO = np.float32(1e-3)
 
-# Places of moving texels that are worked out at once, in whole rows: they stay in the fastest memory.
+# Places of moving texels that are worked out at once, in whole rows: they stay in the fastest
+# memory.
 _BAND = 1024
 
 # Numbers from one row of a band's results to the next, at least the width of a chart. A constant
-# spares the compiler checks of whether the rows overlap: with too many checks it makes no wide loop.
+# spares the compiler checks of whether the rows overlap: with too many checks it makes no wide
+# loop.
 _ROW = 2**14 + 16
 
 # Numbers in single precision, which do not make other numbers double.

@@ -28,8 +28,8 @@ from .topology import TexelTopology
 # Row and column of the two ends of every link, counted from the place where the link is stored.
 _ENDS = (((0, 0), (0, 1)), ((0, 0), (1, 0)), ((0, 0), (1, 1)), ((0, 1), (1, 0)))
 
-# Slices of rows or columns with halo, at all places where a link is stored: the end of a link there,
-# and the end one further on.
+# Slices of rows or columns with halo, at all places where a link is stored: the end of a link
+# there, and the end one further on.
 _ALL = slice(None)
 _HERE = slice(None, -1)
 _NEXT = slice(1, None)

@@ -147,12 +147,13 @@ class TexelMesh:
         shape = (*topology.shape, 3)
         if points.shape != shape:
             raise AtlasError(
-                f"texel positions have shape {points.shape}; this topology needs {shape}, in metres"
+                f"texel positions must have shape {shape} in this topology, in metres, got "
+                f"{points.shape}"
             )
         wrong = int((~np.isfinite(points)).sum())
         if wrong:
             raise AtlasError(
-                f"{wrong} numbers of the texel positions are not finite; valid are metres"
+                f"texel positions must be finite [m], got {wrong} numbers that are not"
             )
         points = np.ascontiguousarray(points)
         around = _with_halo(topology, points, beyond)
@@ -258,15 +259,15 @@ class TexelMesh:
     def stiffness(self, speed: float | NDArray[np.float64] = 1.0) -> csr_array:
         """Stiffness matrix [T, T], T = C n^2, for a wave speed c [m/s].
 
-        It is that of the area integral of c^2 grad . grad, symmetric and positive semidefinite. With
-        the areas as lumped mass M, waves on a free surface of density 1 have M h_tt = -K h.
+        It is that of the area integral of c^2 grad . grad, symmetric and positive semidefinite.
+        With the areas as lumped mass M, waves on a free surface of density 1 have M h_tt = -K h.
         """
         try:
             squared = np.broadcast_to(np.asarray(speed, dtype=np.float64) ** 2, self.shape)
         except (TypeError, ValueError, OverflowError) as error:
             raise AtlasError(
-                f"speed is {shown(speed)}; valid is a number, or an array of shape {self.shape}, "
-                "in m/s"
+                f"speed must be a number, or an array of shape {self.shape}, in m/s, got "
+                f"{shown(speed)}"
             ) from error
         return stiffness_matrix(self.stencil(squared))
 

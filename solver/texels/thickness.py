@@ -24,11 +24,12 @@ from .texel_mesh import smoothed
 
 # Lengths are shares of the longest extent of the surface.
 
-# Points closer to a texel than this are details that do not count: the edges of a box, for instance.
+# Points closer to a texel than this are details that do not count: the edges of a box, for
+# instance.
 _DETAIL = 0.04
 
-# Least radius of a medial ball: a ball that touches two points a detail apart has half the detail as
-# its radius.
+# Least radius of a medial ball: a ball that touches two points a detail apart has half the detail
+# as its radius.
 LEAST = _DETAIL / 2
 
 # Greatest radius of a medial ball.
@@ -196,22 +197,22 @@ def thickness_map(
     met = np.isfinite(way)
     if not met.any():
         raise AtlasError(
-            "what lies inside is met by no ray from the surface inwards; valid is a body within "
-            "it, in the same frame and in metres: the surface goes from "
+            "no ray from the surface inwards meets the inner body: it must lie within the "
+            "surface, in the same frame and in metres; the surface goes from "
             f"{points.min(axis=0).round(4)} to {points.max(axis=0).round(4)}"
         )
     if out.any() and limits[0] == 0:
         message = (
-            f"what lies inside comes out of the surface at {out.mean():.1%} of the texels: "
-            "no layer is left"
+            f"the inner body reaches out of the surface at {out.mean():.1%} of the texels, so "
+            "no layer is left: it must lie within the surface"
         )
         warn_caller(message)
     way = np.clip(way, max(limits[0], _LEAST_THICKNESS * size), limits[1])
     if np.isinf(way).any():
         greatest = float(way[met].max())
         message = (
-            f"{1 - met.mean():.1%} of the texels have nothing below them; they get the "
-            f"greatest: {greatest:.3g} m"
+            f"{1 - met.mean():.1%} of the texels have no inner body below them; they get the "
+            f"greatest thickness, {greatest:.3g} m"
         )
         warn_caller(message)
         way = np.where(met, way, greatest)

@@ -33,10 +33,10 @@ def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.
         array = np.asarray(value, dtype=np.float32)
     except (TypeError, ValueError, OverflowError) as error:
         raise SolverError(
-            f"{name} is {shown(value)}; valid is a number, or an array of shape {shape}"
+            f"{name} must be a number, or an array of shape {shape}, got {shown(value)}"
         ) from error
     if array.shape not in ((), shape):
-        raise SolverError(f"{name} has shape {array.shape}; valid is {shape}, or one number")
+        raise SolverError(f"{name} must be one number or have shape {shape}, got {array.shape}")
     array = np.broadcast_to(array, shape)
     if not np.isfinite(array).all():
         raise SolverError(
@@ -50,7 +50,7 @@ def require_finite(name: str, value: float, unit: str, least: float = -np.inf) -
     largest = sys.float_info.max
     if not (isinstance(value, numbers.Real) and max(least, -largest) <= value <= largest):
         bound = "" if least == -np.inf else f", {least:g} or greater"
-        raise SolverError(f"{name} is {shown(value)} {unit}; valid is a finite number{bound}")
+        raise SolverError(f"{name} must be a finite number{bound}, got {shown(value)} {unit}")
 
 
 def count_substeps(dt: float, stable: float, asked: int | None) -> int:
@@ -71,16 +71,17 @@ def count_substeps(dt: float, stable: float, asked: int | None) -> int:
     ratio = dt / stable * (1 - 1e-12)
     if not ratio < _MAX_SUBSTEPS:
         raise SolverError(
-            f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {stable:.4g} s; "
-            f"valid are {_MAX_SUBSTEPS} at most: take shorter steps, or a material with slower waves"
+            f"a step must take at most {_MAX_SUBSTEPS} substeps, and a step of {dt:.4g} s would "
+            f"take {ratio:.3g} substeps of the stable {stable:.4g} s: take shorter steps, or a "
+            "material with slower waves"
         )
     needed = max(1, int(np.ceil(ratio)))
     if asked is None:
         return needed
     if not (_ONE_OR_MORE.holds(asked) and asked <= _MAX_SUBSTEPS):
         raise SolverError(
-            f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, up to {_MAX_SUBSTEPS}, or None "
-            f"for the fewest"
+            f"substeps must be {_ONE_OR_MORE.words}, up to {_MAX_SUBSTEPS}, or None for the "
+            f"fewest, got {shown(asked)}"
         )
     if asked < needed:
         raise SolverError(
@@ -159,7 +160,6 @@ def check_kick(velocities: NDArray[np.float64], impulse: float) -> float:
     if not fastest <= _MAX_FLOAT32:
         raise SolverError(
             f"impulse is {impulse:.4g} N s, which would move the surface at {fastest:.4g} m/s, "
-            f"beyond float32; "
-            "valid is a smaller one, or a greater density of the material"
+            "beyond float32: give a smaller impulse, or the material a greater density"
         )
     return fastest

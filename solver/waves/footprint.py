@@ -18,13 +18,13 @@ from ..texels.distance import Scratch, clean, distance_scratch, distance_to, mar
 from ..texels.texel_mesh import TexelGrid
 from .finite import require_finite
 
-# Radius of a footprint in texels, at least: a smaller source would excite waves that the grid cannot
-# resolve.
+# Radius of a footprint in texels, at least: a smaller source would excite waves that the grid
+# cannot resolve.
 MIN_TEXELS = 2.0
 
-# Ratios of the distance along the surface to the straight distance. Up to the first ratio the surface
-# counts as flat; from the second on, only the distance along the surface counts. In between, the two
-# distances are blended, so that no texel jumps in or out.
+# Ratios of the distance along the surface to the straight distance. Up to the first ratio the
+# surface counts as flat; from the second on, only the distance along the surface counts. In
+# between, the two distances are blended, so that no texel jumps in or out.
 _FLAT_RATIO = 1.05
 _BENT_RATIO = 1.5
 
@@ -238,12 +238,13 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
     """
     if not (is_finite(radius) and radius >= 0):
         raise SolverError(
-            f"impulse radius is {shown(radius)} m; valid is a finite number, 0 or greater"
+            f"impulse radius must be a finite number, 0 or greater, got {shown(radius)} m"
         )
     points = check_points(point)
     if len(points) != 1:
         raise SolverError(
-            f"a source has {len(points)} points; valid is one, [3]: call this once for each of them"
+            f"a source must have one point, [3], got {len(points)} points: call this once for "
+            "each of them"
         )
     (closest,), (center,) = atlas.nearest(points)
     return footprint_at(atlas, closest, int(center), float(radius))

@@ -1,8 +1,8 @@
 """Height maps for a renderer: height and surface gradient of every texel, with a halo.
 
-The halo is for interpolation. Drawn heights have a limit, so that a surface with high waves does not
-pass through itself. Where the heights are on the GPU, the height map is written into the renderer's
-texture without leaving the GPU.
+The halo is for interpolation. Drawn heights have a limit, so that a surface with high waves does
+not pass through itself. Where the heights are on the GPU, the height map is written into the
+renderer's texture without leaving the GPU.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from ..texels.topology import TexelTopology
 FREE = 0.25
 MOST = 0.6
 
-# Largest height in medial radii that enters the hyperbolic tangent, which is 1 far below it: float32
-# would overflow otherwise.
+# Largest height in medial radii that enters the hyperbolic tangent, which is 1 far below it:
+# float32 would overflow otherwise.
 _MAX_RADII = 1e3
 
 _GROUP = 256  # threads of a group of a compute shader
@@ -49,8 +49,8 @@ _NO_TEXEL = -1
 _REGULARISATION = 1e-4
 _FIRST_ORDER_SHARE = 1e-3
 
-# The tangent is perpendicular to the x axis unless the normal has at least this x component; then it
-# is perpendicular to the y axis.
+# The tangent is perpendicular to the x axis unless the normal has at least this x component; then
+# it is perpendicular to the y axis.
 _MAX_ALONG_X = 0.6
 
 _TEXEL_BYTES = 110  # memory that a height map keeps for each texel

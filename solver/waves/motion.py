@@ -17,8 +17,8 @@ from ..texels.moving import MovedPlaces, SurfaceRide
 from ..texels.texel_mesh import TexelMesh, tangents
 from .height_map import fill_around
 
-# The stiffness is computed again once the square of an edge's length has changed by this share since
-# the last time.
+# The stiffness is computed again once the square of an edge's length has changed by this share
+# since the last time.
 _SQUARED_LENGTH_TOLERANCE = 2e-3
 
 # Folds are counted once in this many computations of the stiffness: both take about as long.
@@ -122,7 +122,7 @@ class Motion:
             V = np.array(vertices, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise SolverError(
-                f"vertices are {shown(vertices)}; valid are numbers of shape {shape}, in m"
+                f"vertices must be numbers of shape {shape}, in m, got {shown(vertices)}"
             ) from error
         if V.shape != shape:
             raise SolverError(
@@ -132,8 +132,7 @@ class Motion:
             )
         if not np.isfinite(V).all():
             raise SolverError(
-                f"{(~np.isfinite(V)).sum()} numbers of the vertices are not finite; valid are "
-                f"metres"
+                f"vertices must be finite [m], got {(~np.isfinite(V)).sum()} numbers that are not"
             )
         return V
 

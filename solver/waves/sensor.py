@@ -27,8 +27,8 @@ KINDS = tuple(UNITS)
 
 _MIN_WAVE_TEXELS = 5.0  # texels along the shortest wave that a sensor measures honestly
 
-# The filter lets through frequencies below _PASSED_SHARE of the rate, and nothing from half the rate
-# on.
+# The filter lets through frequencies below _PASSED_SHARE of the rate, and nothing from half the
+# rate on.
 _FILTER_REACH = 16  # half the filter's length [samples]
 _ATTENUATION = 80.0  # [dB]
 _TABULATED = 512  # tabulated values of the filter for each sample
@@ -119,8 +119,8 @@ class Sensor:
 
     `times` and `samples` are the samples that have not been read yet; `read` returns and removes
     them. Samples of the last `latency` are missing: the filter needs the heights after them. The
-    kind "strain" is the strain of the outer face of a thin sheet that the waves bend: -thickness / 4
-    times the Laplacian of the height, the mean over all directions, positive where the face is
+    kind "strain" is the strain of the outer face of a thin sheet that the waves bend: -thickness /
+    4 times the Laplacian of the height, the mean over all directions, positive where the face is
     longer.
 
     Attributes
@@ -155,20 +155,19 @@ class Sensor:
     ) -> None:
         if kind not in KINDS:
             raise SolverError(
-                f"sensor kind is {shown(kind)}; valid are {', '.join(map(repr, KINDS))}"
+                f"sensor kind must be one of {', '.join(map(repr, KINDS))}, got {shown(kind)}"
             )
         if not POSITIVE.holds(rate):
             raise SolverError(
-                f"sensor rate is {shown(rate)}; valid is {POSITIVE.words}, in samples a second"
+                f"sensor rate must be {POSITIVE.words}, in samples a second, got {shown(rate)}"
             )
         needs_thickness = kind == "strain"
         has_thickness = thickness is not None
         valid_thickness = thickness is None or POSITIVE.holds(thickness)
         if needs_thickness != has_thickness or not valid_thickness:
             raise SolverError(
-                f"sensor thickness is {shown(thickness)} m; valid is {POSITIVE.words} for kind "
-                f"'strain', that of the "
-                "sheet that is bent, and none for the others"
+                f"sensor thickness must be {POSITIVE.words} for kind 'strain' (the thickness of "
+                f"the bent sheet), and None for other kinds, got {shown(thickness)} m"
             )
         self.points, centers = atlas.nearest(points)
         self.kind = kind
@@ -276,9 +275,9 @@ def filtered(
 ) -> NDArray[np.float64]:
     """Pass values [m, points] through the low pass of `_filter`, for other times [k].
 
-    Each value holds for a span [s] round its time. The result is the sum over the filter's length of
-    filter times span times value, divided by the sum of filter times span. So a constant stays the
-    same, also where the length of the substeps changes.
+    Each value holds for a span [s] round its time. The result is the sum over the filter's length
+    of filter times span times value, divided by the sum of filter times span. So a constant stays
+    the same, also where the length of the substeps changes.
     """
     reach = _FILTER_REACH / rate
     first = np.searchsorted(times, at - reach)
@@ -347,8 +346,8 @@ class _Fit(NamedTuple):
     growth: float
 
 
-# Fits of the value at a point, and of the second derivatives there. At five texels a wave the second
-# derivatives of a quartic are 0.7 dB too low, those of a cubic 4 dB.
+# Fits of the value at a point, and of the second derivatives there. At five texels a wave the
+# second derivatives of a quartic are 0.7 dB too low, those of a cubic 4 dB.
 _VALUE = _Fit(degree=3, rings=2, softening=1e-3, power=1.0, growth=1.0)
 _CURVATURE = _Fit(degree=4, rings=3, softening=0.1, power=2.0, growth=0.1)
 
@@ -358,8 +357,9 @@ def _row(
 ) -> tuple[NDArray, NDArray]:
     """Texels round a point, and the weights that give the value of a field at the point.
 
-    With a factor `laplacian`, they give this factor times the field's Laplacian [1/m^2]. The weights
-    are those of a polynomial that fits the texels, see `_Fit`, also across the borders of charts.
+    With a factor `laplacian`, they give this factor times the field's Laplacian [1/m^2]. The
+    weights are those of a polynomial that fits the texels, see `_Fit`, also across the borders of
+    charts.
     """
     fit = _VALUE if laplacian is None else _CURVATURE
     texels = _around(atlas.texels.topology, center, fit.rings)

@@ -234,8 +234,7 @@ class WaveSolver:
         if isinstance(at, str):
             if self.listeners.find_points is None:
                 raise SolverError(
-                    f"sensor at {at!r}: this surface knows no names; valid are points, [3] or [k, "
-                    f"3]"
+                    f"sensor at {at!r}: this surface knows no names; give points, [3] or [k, 3]"
                 )
             at = self.listeners.find_points(at)
         sensor = Sensor(self.atlas, self.material, self.operator, at, kind, rate, thickness)
@@ -264,7 +263,7 @@ class WaveSolver:
         if self._motion is None:
             if self._kind != "fem":
                 raise SolverError(
-                    f"a surface with the operator {self._kind!r} cannot move; valid is 'fem'"
+                    f"a surface that moves must have the operator 'fem', got {self._kind!r}"
                 )
             self._motion = Motion(self.rest, self.material, self.operator)
         operator = self._motion.to(V)
@@ -497,7 +496,7 @@ class WaveSolver:
         shape = self.operator.mass.shape
         if state.elastic.shape != shape:
             raise SolverError(
-                f"the state of waves has shape {state.elastic.shape}; valid is {shape}"
+                f"the state of waves must have shape {shape}, got {state.elastic.shape}"
             )
         self._backend.fields.set_height(state.elastic * self.operator.free, state.dent)
         self._backend.set_velocity(state.velocity * self.operator.movable)

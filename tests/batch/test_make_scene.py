@@ -1,4 +1,4 @@
-"""Scenes of a batch: the same bytes whatever the order, and read the same from folders and tar files."""
+"""Scenes of a batch are the same bytes in any order and in every container."""
 
 import errno
 import fcntl

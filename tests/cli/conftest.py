@@ -1,4 +1,4 @@
-"""Tests of the command line run it in this process: it takes the signals over, has a cache, and refuses in a line."""
+"""Fixtures of the command line: it runs in this process, with a cache of its own."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Words of the command line: what they mean, and what is said where they mean nothing; every option has one."""
+"""Arguments: what they mean, which are refused, and that every option is documented."""
 
 import dataclasses
 from pathlib import Path
@@ -61,7 +61,7 @@ def test_what_is_not_valid_is_quoted_with_what_would_be(
     parse: str, words: list[str], valid: str
 ) -> None:
     for word in words:
-        with pytest.raises(ValueError, match="valid") as refusal:
+        with pytest.raises(ValueError, match="must be") as refusal:
             getattr(arguments, f"parse_{parse}")(word)
         assert repr(word) in str(refusal.value)
         assert valid in str(refusal.value)

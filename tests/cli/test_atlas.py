@@ -108,8 +108,8 @@ def test_a_picture_is_written_and_is_not_blank(coarse_pictures, tmp_path, told, 
 @pytest.mark.parametrize(
     ("path", "said"),
     [
-        ("atlas.bmp", r"'atlas\.bmp'.*valid are \.png"),
-        ("atlas", "valid are"),
+        ("atlas.bmp", r"'atlas\.bmp'.*must end in \.png"),
+        ("atlas", "must end in"),
         ("no/atlas.png", "folder that exists"),
     ],
 )

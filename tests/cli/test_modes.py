@@ -48,11 +48,11 @@ def test_a_sheet_fixed_at_its_rim_is_told_and_drawn(tmp_path, monkeypatch, capsy
 @pytest.mark.parametrize(
     ("material", "said"),
     [
-        ("foam", "'foam' does not exist; valid are membrane"),
-        ("plate,width=2", "no parameter 'width'; valid are modulus, thickness"),
+        ("foam", "preset must be one of membrane"),
+        ("plate,width=2", "no parameter 'width'; its parameters are modulus, thickness"),
         ("plate,thickness", "steel-plate,thickness=0.002"),
-        ("layer,modulus=-1", "modulus is -1.0 Pa"),
-        ("membrane,density=1 --count=99", "valid is a whole number from 1 to"),
+        ("layer,modulus=-1", "modulus must be a finite number greater than 0, got -1.0 Pa"),
+        ("membrane,density=1 --count=99", "must be a whole number from 1 to"),
     ],
 )
 def test_what_is_wrong_is_told(refusal, tetrahedron, material, said):

@@ -1,4 +1,4 @@
-"""Nothing that was not made here is replaced or deleted without `--overwrite`, and links are written through."""
+"""Files that others made stay, without `--overwrite`; links are written through."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -125,7 +125,7 @@ def test_an_export_goes_through_no_link_to_another_ending(tmp_path: Path, name: 
     for target in ("nowhere", "run.mp4"):
         link.symlink_to(target)
         with pytest.raises(
-            ExportError, match=f"is a link to '{target}'; valid is a link to a name that ends in"
+            ExportError, match=f"is a link to '{target}': it must be a link to a name that ends in"
         ):
             check_export(link, True)
         link.unlink()

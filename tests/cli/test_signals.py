@@ -1,4 +1,4 @@
-"""The program as a process: signals, full disks, closed streams, no home: the right status every time."""
+"""The program as a process: signals, full disks, closed streams, no home."""
 
 import errno
 import os
@@ -108,7 +108,7 @@ def test_after_the_command_while_the_interpreter_shuts_down_its_status_stands() 
 
 
 def within(module: str, number: int, function: str = "call") -> list[str]:
-    """Send a signal while a function of a module is running; return what had happened when the exception came."""
+    """Send a signal during a function of a module; return what happened before the exception."""
     happened: list[str] = []
     code = (
         f"def {function}():\n os.kill(os.getpid(), number)\n time.sleep(0.1)\n "

@@ -97,7 +97,7 @@ def test_primitives_are_left_alone() -> None:
     ("geom", "route", "message"),
     [
         ("nose", "sdf", "geoms are 'target', 'knob'"),
-        ("target", "ghost", "valid are 'auto', 'sdf', 'flex', 'convex', 'hull'"),
+        ("target", "ghost", "must be one of 'auto', 'sdf', 'flex', 'convex', 'hull'"),
     ],
 )
 def test_unknown_names_are_refused(geom: str, route: str, message: str) -> None:

@@ -80,7 +80,8 @@ def slab(offset: float, body: str = "") -> mujoco.MjModel:
     """A plate of 0.1 m that is seen, and a thinner one inside that collides."""
     solid = trimesh.creation.box(extents=(1, 1, 0.1)).subdivide_to_size(0.1)
     link = f"""<body name="link">{body}<geom name="plate" type="mesh" mesh="plate" mass="3" {SEEN}/>
-        <geom name="core" type="box" size="0.5 0.5 0.005" pos="0 0 {offset}" mass="0" group="3"/></body>"""
+        <geom name="core" type="box" size="0.5 0.5 0.005" pos="0 0 {offset}" mass="0" group="3"/>
+        </body>"""
     return model_of(
         link + BALL.format(f"0.13 -0.07 {offset + 0.2}"),
         mesh_asset("plate", solid.vertices, solid.faces),
@@ -142,7 +143,8 @@ def test_named_geoms_alone_load_a_target_that_names_them() -> None:
 
 
 def test_two_links_that_are_only_visible_hit_each_other_with_one_momentum() -> None:
-    fist = f"""<body name="ball" pos="0.3 0 0.8"><freejoint/><geom name="fist" size="0.06" {SEEN} mass="0"/>
+    fist = f"""<body name="ball" pos="0.3 0 0.8"><freejoint/>
+    <geom name="fist" size="0.06" {SEEN} mass="0"/>
         <geom name="core" size="0.05" mass="{MASS}"/></body>"""
     run, lost = play(model_of(ARM + fist), ("right", "fist"))
     assert run.pairs == {("right", "core"), ("fist", "bone")}
@@ -153,8 +155,10 @@ def test_two_links_that_are_only_visible_hit_each_other_with_one_momentum() -> N
 def test_collision_geom_with_a_flex_collider_and_the_target_that_it_stands_for() -> None:
     """A visible ball around an animal that collides through a flex."""
     spec = mujoco.MjSpec.from_string(
-        f"""<mujoco><option timestep="0.001"/><asset>{mesh_asset("animal", *limbed(0.05))}</asset><worldbody>
-        <body name="link"><geom name="shell" size="0.5" {SEEN}/><geom name="core" type="mesh" mesh="animal"/></body>
+        f"""<mujoco><option timestep="0.001"/><asset>{mesh_asset("animal", *limbed(0.05))}</asset>
+        <worldbody>
+        <body name="link"><geom name="shell" size="0.5" {SEEN}/>
+        <geom name="core" type="mesh" mesh="animal"/></body>
         {BALL.format("-0.03 0 0.7")}</worldbody></mujoco>"""
     )
     make_collidable(spec, "core", "flex")

@@ -1,4 +1,4 @@
-"""MuJoCo's contacts by target and geom: none is lost, doubled or turned round, with geoms and with flex colliders."""
+"""MuJoCo's contacts by target and geom: none is lost, doubled or turned round."""
 
 import mujoco
 import numpy as np
@@ -72,7 +72,7 @@ def test_every_contact_with_a_force_is_found_once_for_each_target_it_touches(
 
 
 def test_speculative_contact_loads_the_target_where_it_is() -> None:
-    """MuJoCo's speculative contacts have a made-up overlap of metres, which must not carry their points away."""
+    """MuJoCo's speculative contacts have overlaps of metres, which must not move their points."""
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0.1 0 0.53"))
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data)
@@ -93,7 +93,8 @@ def slab_and_table(bodies: str, slab: str = "") -> mujoco.MjModel:
     solid = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
     V, F = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, 0.12)
     spec = mujoco.MjSpec.from_string(
-        f"""<mujoco><default><geom condim="1"/></default><asset>{mesh_asset("m", V, F)}</asset><worldbody>
+        f"""<mujoco><default><geom condim="1"/></default><asset>{mesh_asset("m", V, F)}</asset>
+        <worldbody>
         <geom name="table" type="box" size="0.3 0.3 0.2" pos="0.6 0 0"/>
         <body name="slab" {slab}>{"<freejoint/>" if slab else ""}
         <geom name="slab" type="mesh" mesh="m" mass="3"/></body>{bodies}</worldbody></mujoco>"""
@@ -158,7 +159,8 @@ def test_a_sticky_ball_gives_the_target_its_weight_and_no_more(
     adhesion = 'adhesion="20"' if sticky != "actuator" else ""
     actuator = '<adhesion body="ball" ctrlrange="0 1" gain="30"/>' if sticky != "geom" else ""
     model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="0.001" cone="{cone}"/><worldbody><geom name="target" size="0.5"/>
+        f"""<mujoco><option timestep="0.001" cone="{cone}"/><worldbody>
+        <geom name="target" size="0.5"/>
         <body name="ball" pos="0 0 {side * 0.55}"><freejoint/>
         <geom name="ball" size="0.05" mass="1" gap="0.01" {adhesion}/></body></worldbody>
         <actuator>{actuator}</actuator></mujoco>"""
@@ -178,7 +180,8 @@ def test_a_sticky_ball_gives_the_target_its_weight_and_no_more(
 
 def test_two_suckers_on_one_body_share_the_force_among_their_contacts() -> None:
     model = mujoco.MjModel.from_xml_string(
-        """<mujoco><option timestep="0.001"/><worldbody><geom name="target" type="box" size="0.5 0.5 0.1"/>
+        """<mujoco><option timestep="0.001"/><worldbody>
+        <geom name="target" type="box" size="0.5 0.5 0.1"/>
         <body name="plate" pos="0 0 -0.15"><freejoint/><geom size="0.05" pos="-0.2 0 0" mass="1"/>
         <geom size="0.05" pos="0.2 0 0" mass="1"/></body></worldbody>
         <actuator><adhesion body="plate" ctrlrange="0 1" gain="60"/></actuator></mujoco>"""

@@ -1,4 +1,4 @@
-"""Easing takes up all of what is light, and no more of what is heavy than what reaches the law's most."""
+"""Easing takes the whole of a light load, and of a heavy load no more than the limit."""
 
 import numpy as np
 import pytest

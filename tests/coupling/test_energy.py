@@ -1,4 +1,4 @@
-"""Bodies and waves together gain no energy in contact, and bodies rest where they rest without waves."""
+"""Bodies and waves gain no energy in contact, and bodies rest where they should."""
 
 import copy
 import warnings
@@ -39,7 +39,8 @@ def scene(
     gravity = 0.0 if "free" in joint else -GRAVITY
     geom = f'type="{"box" if kind == "cube" else kind}" {GEOMS[kind]} mass="{mass}"'
     return mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="{dt}" cone="{cone}" gravity="0 0 {gravity}"/><default><geom {contact}/></default>
+        f"""<mujoco><option timestep="{dt}" cone="{cone}" gravity="0 0 {gravity}"/><default>
+        <geom {contact}/></default>
         <worldbody><body>{joint}<geom name="target" type="box" size="0.5 0.5 0.1" mass="20"/></body>
         <body pos="0.03 0.02 {0.1 + fall}"><freejoint/><geom {geom}/></body>
         </worldbody></mujoco>"""
@@ -110,7 +111,7 @@ def test_a_body_laid_at_rest_stays_in_its_dimple(mass: float, dt: float, kind: s
 
 
 def test_a_ball_gives_its_energy_to_waves_without_damping() -> None:
-    """None is lost between an undamped contact and undamped waves, and the bounce is lower by what the waves have."""
+    """An undamped contact loses no energy: the bounce is lower by the energy of the waves."""
     run = coupled(
         scene("sphere", 0.5, 0.0005, 0.3, 'solref="-20000 0"'),
         Material(1.0, 0.0, 3e4, density=1000.0),
@@ -147,7 +148,8 @@ def test_velocities_change_as_the_step_would_have_changed_them(integrator: str) 
     """Of a body that spins, over a hinge with damping, when its contact forces are taken back."""
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.002" integrator="{integrator}"/><worldbody>
-        <body pos="0.4 0 0"><joint axis="0 1 0" damping="5"/><geom type="box" size="0.5 0.5 0.1" mass="20"/></body>
+        <body pos="0.4 0 0"><joint axis="0 1 0" damping="5"/>
+        <geom type="box" size="0.5 0.5 0.1" mass="20"/></body>
         <body pos="0 0 0.147"><freejoint/><geom type="box" size="0.1 0.08 0.05" mass="3"/></body>
         </worldbody></mujoco>"""
     )

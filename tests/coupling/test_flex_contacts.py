@@ -151,7 +151,8 @@ def test_flex_written_by_hand_is_known_by_its_name() -> None:
     spec = mujoco.MjSpec.from_string(
         f"""<mujoco><asset>{mesh_asset("shape", V, F)}</asset><worldbody>
         <geom name="target" type="mesh" mesh="shape" contype="0" conaffinity="0"/>
-        <flexcomp name="target" type="direct" dim="2" rigid="true" radius="0.004" point="{vector(V)}"
+        <flexcomp name="target" type="direct" dim="2" rigid="true" radius="0.004"
+          point="{vector(V)}"
         element="{vector(F)}"/></worldbody></mujoco>"""
     )
     add_ball(spec, "ball", [-0.17, 0.01, 0.35])
@@ -170,7 +171,7 @@ ASIDE = (1.0, 0.0, 0.0)
 
 @pytest.fixture(scope="module")
 def slab() -> tuple[mujoco.MjModel, np.ndarray]:
-    """A block that collides through a flex, geom 0, with a ball of 0.03 m; and the outward normals of its triangles."""
+    """A block that collides through a flex (geom 0), a ball of 0.03 m, and outward normals."""
     solid = trimesh.creation.box(extents=(1, 1, 1))
     spec = mesh_spec((solid.vertices, solid.faces))
     add_ball(spec, "ball", [0, 0, 9], size=[0.03, 0, 0])
@@ -196,9 +197,14 @@ def summed(slab: tuple, contacts: list[tuple], surface: tuple[float, ...] | None
     if surface is not None:
         elements[:, 0] = (normals @ surface).argmax()
     contact = SimpleNamespace(
-        dim=np.full(k, 3, np.int32), friction=np.ones((k, 5)), elem=elements, frame=frames.reshape(k, 9),
-        pos=np.zeros((k, 3)), dist=np.full(k, -0.002), includemargin=np.zeros(k),
-    )  # fmt: skip
+        dim=np.full(k, 3, np.int32),
+        friction=np.ones((k, 5)),
+        elem=elements,
+        frame=frames.reshape(k, 9),
+        pos=np.zeros((k, 3)),
+        dist=np.full(k, -0.002),
+        includemargin=np.zeros(k),
+    )
     data = SimpleNamespace(contact=contact, geom_xmat=np.tile(np.eye(3).ravel(), (2, 1)))
     rows = np.arange(k), np.zeros(k, int), np.zeros(k, int), np.ones(k, int), np.zeros(1, int)
     along = np.einsum("kij,kj->ki", frames, [force for _, force in contacts])
@@ -212,7 +218,7 @@ RIM = [(UP, (0, 0, 3)), (ASIDE, (50, 0, 1)), ((-1, 0, 0), (-50, 0, 2))]
 
 
 def test_friction_of_contacts_that_push_sideways_counts_along_the_normal(slab: tuple) -> None:
-    """Two opposite contacts at a rim cancel along x, but their friction pushes upwards: 3 + 1 + 2 N."""
+    """Opposite contacts at a rim cancel along x; their friction pushes upwards, 3 + 1 + 2 N."""
     assert summed(slab, RIM, surface=None)[0].all(), (
         "without the surface's normals all three would count as normals"
     )
@@ -225,13 +231,15 @@ def test_friction_of_contacts_that_push_sideways_counts_along_the_normal(slab: t
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
 @pytest.mark.parametrize("condim", [1, 3, 4, 6])
 def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condim: int) -> None:
-    """A cylinder that slides and tumbles on a slab, step by step against MuJoCo's constraint force on its joint."""
+    """A cylinder slides and tumbles on a slab; compare MuJoCo's constraint force each step."""
     slab = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
     V, F = trimesh.remesh.subdivide_to_size(slab.vertices, slab.faces, 0.1)
     spec = mujoco.MjSpec.from_string(
-        f"""<mujoco><option cone="{cone}"/><default><geom condim="{condim}" friction="0.5 0.01 0.01"/></default>
+        f"""<mujoco><option cone="{cone}"/><default>
+        <geom condim="{condim}" friction="0.5 0.01 0.01"/></default>
         <asset>{mesh_asset("m", V, F)}</asset><worldbody><body pos="0.1 0.2 0.3" euler="0 0 20">
-        <geom name="slab" type="mesh" mesh="m"/></body><body pos="0.1 0.2 0.57" euler="70 10 0"><freejoint/>
+        <geom name="slab" type="mesh" mesh="m"/></body><body pos="0.1 0.2 0.57" euler="70 10 0">
+        <freejoint/>
         <geom type="cylinder" size="0.05 0.04" mass="0.3"/></body></worldbody></mujoco>"""
     )
     make_collidable(spec, "slab", "flex")

@@ -13,7 +13,8 @@ from ripple_sim.coupling import CoupledModel, find_geom, geom_name
 from ripple_sim.scenes.shapes import peanut
 
 NAMELESS = """<geom type="plane" size="1 1 1"/>
-<body name="torso" pos="0 0 2"><geom name="chest" size="0.1"/><geom size="0.1"/><geom name="torso/3" size="0.1"/>
+<body name="torso" pos="0 0 2"><geom name="chest" size="0.1"/><geom size="0.1"/>
+<geom name="torso/3" size="0.1"/>
 <geom size="0.1"/><body pos="0 0 1"><geom size="0.1"/></body></body>"""
 
 
@@ -55,7 +56,7 @@ def test_a_geom_with_two_values_is_refused() -> None:
     model = model_of(NAMELESS)
     assert coupling.by_name(model, {"chest": 1, 2: 5}, "numbers") == {"chest": 1, "torso/1": 5}
     with pytest.raises(
-        RippleError, match="numbers has two entries for geom 'chest', one of them as 1"
+        RippleError, match="numbers must have one entry for geom 'chest', got two, one of them as 1"
     ):
         coupling.by_name(model, {"chest": 1, 1: 2}, "numbers")
 
@@ -92,7 +93,8 @@ ROBOT = f"""<geom name="floor" type="plane" size="1 1 1"/>
   <geom name="hull0" size="0.19"/><geom name="hull1" size="0.1"/>
   <body name="tool"><geom name="blade" size="0.1" {SEEN}/>
     <body name="guard"><geom name="guard" size="0.05"/></body></body>
-  <body name="finger"><joint/><geom name="nail" size="0.1" {SEEN}/><geom name="pad" size="0.1"/></body>
+  <body name="finger"><joint/><geom name="nail" size="0.1" {SEEN}/><geom name="pad" size="0.1"/>
+  </body>
 </body>"""
 
 
@@ -132,7 +134,8 @@ def test_colliders_of_targets(model, targets, contacts, expected) -> None:
 def test_a_pair_collides_whatever_its_masks_say() -> None:
     seen = f'<body name="a"><freejoint/><geom name="a" size="0.1" {SEEN}/></body>'
     spec = mujoco.MjSpec.from_string(
-        f"""<mujoco><worldbody>{seen}<geom name="b" size="0.1" {SEEN}/><geom name="c" size="0.1" {SEEN}/></worldbody>
+        f"""<mujoco><worldbody>{seen}<geom name="b" size="0.1" {SEEN}/>
+        <geom name="c" size="0.1" {SEEN}/></worldbody>
         <contact><pair geom1="b" geom2="a"/></contact></mujoco>"""
     )
     coupled = CoupledModel(spec.compile(), [0, 1, 2])
@@ -147,7 +150,7 @@ def test_a_pair_collides_whatever_its_masks_say() -> None:
     [
         (
             {"shell": ["pad"]},
-            "names geom 'pad' on body 'finger', which moves by itself; valid are .* body 'link'",
+            "must be geoms of body 'link' .*, got geom 'pad' on body 'finger', which moves",
         ),
         ({"shell": ["cap"]}, "names geom 'cap', which ripples itself"),
         ({"shell": ["hull2"]}, "no geom 'hull2'; its geoms are"),
@@ -155,10 +158,10 @@ def test_a_pair_collides_whatever_its_masks_say() -> None:
             {"blade": ["guard"]},
             "geom 'blade', which does not ripple; the rippling geoms are 'shell', 'cap'",
         ),
-        ({"shell": "hull0"}, "contacts of geom 'shell' is 'hull0'; valid is a list"),
-        ({"shell": 3}, "contacts of geom 'shell' is 3; valid is a list"),
-        ({"shell": ["hull0"], 4: []}, "contacts has two entries for geom 'shell'"),
-        (["shell"], r"contacts is \['shell'\]; valid is a mapping"),
+        ({"shell": "hull0"}, "contacts of geom 'shell' must be a list of geoms, got 'hull0'"),
+        ({"shell": 3}, "contacts of geom 'shell' must be a list of geoms, got 3"),
+        ({"shell": ["hull0"], 4: []}, "contacts must have one entry for geom 'shell', got two"),
+        (["shell"], r"contacts must be a mapping .*, got \['shell'\]"),
     ],
 )
 def test_invalid_contacts_are_named(model, contacts, message: str) -> None:
@@ -178,15 +181,15 @@ SCENE = '<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2")
 @pytest.mark.parametrize(
     ("materials", "options", "message"),
     [
-        ({"target": 1.0}, {}, "material of geom 'target' is 1.0; valid is a Material"),
-        (["target"], {}, "materials is list; valid is a mapping of geom names to Material"),
+        ({"target": 1.0}, {}, "material of geom 'target' must be a Material or a Target, got 1.0"),
+        (["target"], {}, "materials must be a mapping of geom names to Material .*, got list"),
         (
             {"target": Material()},
             {"resolution": {}},
             "resolution has no entry for geom 'target'; it has none",
         ),
         ({"target": Material()}, {"resolution": {"ball": 8}}, "it has 'ball'"),
-        ({"target": Material()}, {"resolution": "fine"}, "resolution is 'fine'"),
+        ({"target": Material()}, {"resolution": "fine"}, "resolution must be .*, got 'fine'"),
     ],
 )
 def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: str) -> None:
@@ -203,10 +206,10 @@ def begun(model: mujoco.MjModel) -> Ripples:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda ripples: ripples.make_rigid("target", "top", 0.1), "points are 'top'"),
+        (lambda ripples: ripples.make_rigid("target", "top", 0.1), "points must be .*, got 'top'"),
         (lambda ripples: ripples.poke("target", [0.0, np.nan, 0.0], 0.1), "points"),
-        (lambda ripples: ripples.to_geom("target", [1.0, 2.0]), "points have shape"),
-        (lambda ripples: ripples.hold("target", "all"), "region is 'all'"),
+        (lambda ripples: ripples.to_geom("target", [1.0, 2.0]), "points must have shape"),
+        (lambda ripples: ripples.hold("target", "all"), "region must be .*, got 'all'"),
         (lambda ripples: ripples["ball"], "'target'"),
     ],
 )

@@ -1,4 +1,4 @@
-"""A hit lasts as long as Hertz's law says, with the impulse of MuJoCo's contact; all else stays as it is."""
+"""A hit lasts as Hertz's law says, with the impulse of MuJoCo's contact."""
 
 import inspect
 
@@ -23,7 +23,7 @@ ELASTIC = "-1e5 0"
 
 
 class Fall(Run):
-    """A body falls on a target; what the target gets is noted: times [s], and forces [N] over them."""
+    """A body falls on a target; records the target's load: times [s] and forces [N]."""
 
     def __init__(
         self,
@@ -34,7 +34,8 @@ class Fall(Run):
         solref="0.02 1",
         **options,
     ):
-        xml = f"""<mujoco><option timestep="0.002" gravity="0 0 {-9.81 * (speed == 0)}"/><worldbody>{target}
+        xml = f"""<mujoco><option timestep="0.002" gravity="0 0 {-9.81 * (speed == 0)}"/>
+        <worldbody>{target}
             <body pos="0 0 {height}"><freejoint/>{other}</body></worldbody></mujoco>"""
         options = {"resolution": 16, "pulse": "hertz", "modulus": 1e8, **options}
         model = mujoco.MjModel.from_xml_string(xml.format(solref=solref))
@@ -74,7 +75,7 @@ def note_loads(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def hertz(modulus: float, radius: float) -> tuple[float, float]:
-    """Time in which nine tenths of the impulse are given [s], and greatest force [N], of a mass on Hertz's spring."""
+    """Duration of 90 % of the impulse [s] and greatest force [N] on Hertz's spring."""
     spring = 4 / 3 * modulus * np.sqrt(radius)
     times = np.linspace(0, 4 * (MASS**2 / (radius * modulus**2 * SPEED)) ** 0.2, 4001)
     way, speed = odeint(
@@ -174,8 +175,11 @@ def test_gpu_and_processor_agree_and_a_reset_ends_the_pulse():
     ("options", "message"),
     [
         ({"pulse": "soft"}, "pulse of geom 'target' must be one of 'contact', 'hertz', got 'soft'"),
-        ({"modulus": None}, r"modulus is None Pa .* valid is a finite number greater than 0: E\*"),
-        ({"modulus": {"target": -1.0}}, "modulus is -1.0 Pa"),
+        (
+            {"modulus": None},
+            r"modulus of .* must be a finite number greater than 0, got None Pa: E\*",
+        ),
+        ({"modulus": {"target": -1.0}}, "must be .*, got -1.0 Pa"),
         ({"two_way": True}, "take two_way=False, or pulse='contact'"),
     ],
 )

@@ -1,4 +1,4 @@
-"""The load on a target gives the impulse of its contacts, no more and no less, where they are, and it is told of."""
+"""The load on a target has the impulse and the place of its contacts, and is reported."""
 
 import dataclasses
 from typing import NamedTuple
@@ -166,7 +166,7 @@ def test_parts_of_one_flex_are_told_of_together_at_their_middle_on_the_surface()
 
 
 def test_a_target_gets_the_same_load_whether_others_ripple_or_not() -> None:
-    """Three targets and bodies on all of them: those that ripple with others have the same waves, bit for bit."""
+    """Targets with bodies on them have the same waves alone and together, bit for bit."""
     rng = np.random.default_rng(4)
     target = '<geom name="{}" type="box" size="0.3 0.3 0.05" pos="{} 0 0"/>'
     names = ("left", "middle", "right")
@@ -209,12 +209,16 @@ GROOVE = """<mujoco><option timestep="0.001"/><asset>
   -.3 .4 -.1  .3 .4 -.1  .3 .4 .3  0 .4 0  -.3 .4 .3"
   face="0 1 3  1 2 3  0 3 4
   5 8 6  6 8 7  5 9 8  0 5 6  0 6 1  1 6 7  1 7 2  2 7 8  2 8 3  3 8 9  3 9 4  4 9 5  4 5 0"/>
-<mesh name="left" vertex="-.3 -.4 -.1  0 -.4 -.1  0 -.4 0  -.3 -.4 .3  -.3 .4 -.1  0 .4 -.1  0 .4 0  -.3 .4 .3"/>
-<mesh name="right" vertex=".3 -.4 -.1  0 -.4 -.1  0 -.4 0  .3 -.4 .3  .3 .4 -.1  0 .4 -.1  0 .4 0  .3 .4 .3"/>
+<mesh name="left"
+  vertex="-.3 -.4 -.1  0 -.4 -.1  0 -.4 0  -.3 -.4 .3  -.3 .4 -.1  0 .4 -.1  0 .4 0  -.3 .4 .3"/>
+<mesh name="right"
+  vertex=".3 -.4 -.1  0 -.4 -.1  0 -.4 0  .3 -.4 .3  .3 .4 -.1  0 .4 -.1  0 .4 0  .3 .4 .3"/>
 </asset><default><geom condim="1"/></default><worldbody><body>
 <geom name="groove" type="mesh" mesh="groove" contype="0" conaffinity="0"/>
-<geom name="left" type="mesh" mesh="left" group="3"/><geom name="right" type="mesh" mesh="right" group="3"/></body>
-<body pos="0 0 {height}"><freejoint/><geom name="ball" size="0.16" mass="1"/></body></worldbody></mujoco>"""
+<geom name="left" type="mesh" mesh="left" group="3"/>
+<geom name="right" type="mesh" mesh="right" group="3"/></body>
+<body pos="0 0 {height}"><freejoint/><geom name="ball" size="0.16" mass="1"/></body></worldbody>
+</mujoco>"""
 
 
 def test_a_wedged_ball_is_told_of_where_it_touches() -> None:

@@ -1,4 +1,4 @@
-"""The loops that people write: whatever way the steps are taken, the waves get each impulse once, and resets reset."""
+"""Users' loops: the waves get each impulse once, and a reset resets them."""
 
 import copy
 import types
@@ -16,7 +16,8 @@ GRAVITY = 9.81
 MASS = 0.3
 BALL = f"""<mujoco model="bounce"><option timestep="0.001"/><worldbody>
 <geom name="block" type="box" size="0.5 0.5 0.2" pos="0 0 -0.2" solref="0.01 0.3"/>
-<body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
+<body name="ball" pos="0.03 0.02 0.06"><freejoint/>
+<geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
 </worldbody><keyframe><key name="late" time="3" qpos="0 0 0.049 1 0 0 0"/></keyframe></mujoco>"""
 
 Loop = Callable[[Ripples, mujoco.MjModel, mujoco.MjData], None]
@@ -124,7 +125,7 @@ def test_only_the_data_that_is_followed_is() -> None:
 
 
 def test_forces_that_are_not_solved_yet_are_solved_for() -> None:
-    """As in dm_control's loop, which ends with mj_step1: the contacts are those of the next step already."""
+    """dm_control's loop ends with mj_step1, so the contacts are those of the next step."""
     ripples, model, data = bounce()
     given = 0.0
     mujoco.mj_step1(model, data)
@@ -189,7 +190,7 @@ def test_data_of_another_model_is_refused() -> None:
             RippleError, match=r"another model \('chair', nq 0.*\) than .* \('bounce', nq 7"
         ):
             call(data)
-    with pytest.raises(RippleError, match="data is NoneType"):
+    with pytest.raises(RippleError, match=r"data must be .*, got NoneType"):
         ripples.step(None)
 
 
@@ -300,7 +301,7 @@ def test_two_data_in_turn_are_warned_of_once(copied: bool) -> None:
 
 
 def test_data_of_one_simulation_are_not_warned_of() -> None:
-    """A new MjData for each episode, one that is reset, and two between which the simulation goes back and forth."""
+    """A new MjData each episode, one that is reset, and two that take turns."""
     ripples, model, first = bounce()
     second = mujoco.MjData(model)
 

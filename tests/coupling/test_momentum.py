@@ -1,4 +1,4 @@
-"""What the surface gets is what the bodies lose: for every shape, route, restitution, time step and frame rate."""
+"""The surface gains what the bodies lose: every shape, route, restitution and time step."""
 
 import itertools
 import runpy
@@ -55,13 +55,15 @@ def drop(
     cone: str = "pyramidal",
     condim: int = 1,
 ) -> tuple[float, float, float, float]:
-    """Sum of impulses, the body's change of momentum, the surface's momentum, and the coefficient of restitution."""
+    """Impulses, change of the body's momentum, the surface's momentum, and restitution."""
     geom, top = TARGETS[target]
     spec = mujoco.MjSpec.from_string(
         f"""<mujoco><option timestep="0.002" sdf_initpoints="10" cone="{cone}"/>
-        <default><geom solref="{SOLREF[restitution]}" condim="{condim}"/></default><asset>{assets}</asset>
+        <default><geom solref="{SOLREF[restitution]}" condim="{condim}"/></default>
+        <asset>{assets}</asset>
         <worldbody><body name="body" pos="-0.03 0 {top + 0.25}"><freejoint/>
-        <geom {BODIES[body]} mass="{MASS}"/></body><body>{joint}<geom name="target" {geom} mass="3"/></body></worldbody>
+        <geom {BODIES[body]} mass="{MASS}"/></body>
+        <body>{joint}<geom name="target" {geom} mass="3"/></body></worldbody>
         </mujoco>"""
     )
     if target == "flex":
@@ -136,7 +138,7 @@ def aside(waves: WaveSolver) -> int:
 
 
 def first_crest(model: mujoco.MjModel, seconds: float = 0.75) -> tuple[float, float, float]:
-    """Momentum that the surface gained and that the ball lost, and when the crest is 0.7 rad from the hit [s]."""
+    """The surface's gain and the ball's loss of momentum, and when the crest is at 0.7 rad [s]."""
     run = Run(model, "target", resolution=32)
     record = []
     waves = run.ripples["target"]
@@ -157,14 +159,19 @@ def _extremum(times: np.ndarray, heights: np.ndarray) -> float:
 def ball_on_sphere(timestep: float, solref: str, integrator: str = "Euler") -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{timestep}" integrator="{integrator}"/>
-        <default><geom solref="{solref}"/></default><worldbody><geom name="target" type="sphere" size="0.5"/>
-        <body pos="0 0 0.8"><freejoint/><geom size="0.05" mass="{MASS}"/></body></worldbody></mujoco>"""
+        <default><geom solref="{solref}"/></default><worldbody>
+        <geom name="target" type="sphere" size="0.5"/>
+        <body pos="0 0 0.8"><freejoint/><geom size="0.05" mass="{MASS}"/></body></worldbody>
+        </mujoco>"""
     )
 
 
 @pytest.mark.parametrize("restitution", SOLREF)
 def test_answer_does_not_depend_on_the_physics_time_step(restitution: float) -> None:
-    """Up to MuJoCo's own springs: under-damped ones, at 4 ms, throw the ball back 7 % slower than at 1 ms."""
+    """The bounce is the same but for MuJoCo's springs.
+
+    Under-damped springs at 4 ms return the ball 7 % slower than at 1 ms.
+    """
     results = [first_crest(ball_on_sphere(dt, SOLREF[restitution])) for dt in (0.004, 0.002, 0.001)]
     momenta, lost, arrivals = np.array(results).T
     np.testing.assert_allclose(momenta, lost, rtol=0.015)
@@ -252,11 +259,13 @@ def test_a_target_that_falls_on_the_ground_gets_its_change_of_momentum(
     if target == "convex":
         pytest.importorskip("coacd")
     spec = mujoco.MjSpec.from_string(
-        f"""<mujoco><option timestep="0.002"/><compiler angle="degree"/><default><geom condim="1"/></default>
+        f"""<mujoco><option timestep="0.002"/><compiler angle="degree"/><default><geom condim="1"/>
+        </default>
         <asset>{mesh_asset("peanut", *peanut(0.06))}
         <hfield name="flat" nrow="5" ncol="5" size="3 3 0.1 0.2"/></asset><worldbody>
         <geom name="ground" type="{ground}" {GROUND[ground]}/>
-        <body name="body" pos="0.01 0.02 0.3"><freejoint/><geom name="target" {FALLING[target]} mass="2"/></body>
+        <body name="body" pos="0.01 0.02 0.3"><freejoint/>
+        <geom name="target" {FALLING[target]} mass="2"/></body>
         </worldbody></mujoco>"""
     )
     if target in ("sdf", "flex", "convex", "hull"):

@@ -1,4 +1,4 @@
-"""Contacts mark the corners of a patch: the force is spread over it, and force and torque stay the same."""
+"""Contacts are the corners of a patch; force and torque stay the same on the patch."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_force_and_torque_stay_what_they_are(block: Atlas, seed: int) -> None:
 
 
 def test_no_force_where_the_surface_is_not() -> None:
-    """Two contacts on the head and on the rump of an animal load it there, and not on the saddle between them."""
+    """Two contacts, on the head and the rump, load these two and not the saddle between them."""
     V, F = limbed(0.05)
     animal = build_atlas(Mesh.from_arrays(V, F), 16, cache=False)
     head = V[V[:, 2].argmax()]
@@ -69,7 +69,7 @@ def test_far_contacts_of_one_pair_stay_apart_and_add_up() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_patches_do_not_depend_on_one_another(block: Atlas, seed: int) -> None:
-    """Four geoms on the upper side of a cube, of which one has a single contact and one is not convex."""
+    """Four geoms on a cube: one has a single contact, and one is not convex."""
     rng = np.random.default_rng(seed)
     counts = rng.integers(1, 6, 4)
     counts[rng.integers(4)] = 1

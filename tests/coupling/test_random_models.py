@@ -1,4 +1,4 @@
-"""Sixty random models of every kind: impulses in place, as bodies feel them, or a warning says not."""
+"""Sixty random models: impulses are in place and as bodies feel them, or a warning says not."""
 
 import warnings
 from collections.abc import Callable, Iterator
@@ -27,7 +27,7 @@ SLACK = 1.5
 
 
 class Hit:
-    """A random model whose geoms meet: what was exchanged, what was warned of, and how high the waves were."""
+    """A random model whose geoms meet: impulses, warnings and the height of the waves."""
 
     def __init__(self, seed: int) -> None:
         random = RandomModel(seed)
@@ -106,7 +106,7 @@ class Hit:
 
 @pytest.fixture(scope="module")
 def _one_sphere_map_a_shape() -> Iterator[None]:
-    """Meshes that differ in size alone share their sphere map: most of the time that small models' atlases take."""
+    """Meshes that differ in size alone share a sphere map, the dearest part of small atlases."""
     known: dict[tuple[str, bytes, bytes], np.ndarray] = {}
 
     def shared(name: str, sphere_map: Callable) -> Callable:

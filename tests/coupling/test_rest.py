@@ -1,4 +1,4 @@
-"""Bodies at rest: the surface becomes still and bears their weight; chatter is averaged, and no impulse is lost."""
+"""Bodies at rest: the surface is still and bears their weight; no impulse is lost."""
 
 import functools
 
@@ -39,7 +39,8 @@ def model_of(target: str, body: str, solref: str) -> mujoco.MjModel:
         f"""<mujoco><option timestep="0.002" sdf_initpoints="40"/>
         <default><geom solref="{solref}" friction="1 0.05 0.05" condim="6"/></default>
         <asset>{limbed_asset()}</asset>
-        <worldbody>{geom}<body name="body" pos="0 0 {top + 0.2}"><freejoint/><geom {BODIES[body]} mass="0.5"/></body>
+        <worldbody>{geom}<body name="body" pos="0 0 {top + 0.2}"><freejoint/>
+        <geom {BODIES[body]} mass="0.5"/></body>
         </worldbody></mujoco>"""
     )
     if target == "flex":
@@ -113,8 +114,10 @@ def test_surface_under_a_stack_and_its_neighbours_becomes_still(target: str, dt:
     body = '<body pos="{} 0 {}"><freejoint/><geom {} mass="0.5"/></body>'
     bodies = "".join(body.format(x, top + z, BODIES[kind]) for kind, x, z in places)
     model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="{dt}" sdf_initpoints="10"/><default><geom friction="1 0.05 0.05" condim="6"/>
-        </default><asset>{limbed_asset()}</asset><worldbody>{TARGETS[target][0]}{bodies}</worldbody></mujoco>"""
+        f"""<mujoco><option timestep="{dt}" sdf_initpoints="10"/><default>
+        <geom friction="1 0.05 0.05" condim="6"/>
+        </default><asset>{limbed_asset()}</asset><worldbody>{TARGETS[target][0]}{bodies}</worldbody>
+        </mujoco>"""
     )
     run = Run(model, "target", material=MATERIAL, resolution=16)
     history = []
@@ -130,9 +133,12 @@ def hammered(target: str, off: float) -> mujoco.MjModel:
     geom, top = TARGETS[target]
     return mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.002" sdf_initpoints="10"/>
-        <default><geom friction="1 0.05 0.05" condim="6"/></default><asset>{limbed_asset()}</asset><worldbody>{geom}
-        <body name="body" pos="0 0 {top + 0.041}"><freejoint/><geom {BODIES["box"]} mass="0.5" conaffinity="3"/></body>
-        <body name="hammer" pos="{off} 0 {top + 0.5}" gravcomp="1"><joint name="hammer" type="slide" axis="0 0 1"/>
+        <default><geom friction="1 0.05 0.05" condim="6"/></default><asset>{limbed_asset()}</asset>
+        <worldbody>{geom}
+        <body name="body" pos="0 0 {top + 0.041}"><freejoint/>
+        <geom {BODIES["box"]} mass="0.5" conaffinity="3"/></body>
+        <body name="hammer" pos="{off} 0 {top + 0.5}" gravcomp="1">
+        <joint name="hammer" type="slide" axis="0 0 1"/>
         <geom size="0.03" mass="1" contype="2" conaffinity="2"/></body></worldbody></mujoco>"""
     )
 
@@ -165,7 +171,8 @@ def test_a_hit_makes_the_same_wave_after_any_rest(
 def test_a_rod_that_stays_in_contact_drives_waves_for_ever(frequency: float, dt: float) -> None:
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{dt}"/><worldbody>{TARGETS["sphere"][0]}
-        <body pos="0 0 0.06"><joint name="rod" type="slide" axis="0 0 1"/><geom type="capsule" size="0.03 0.03"
+        <body pos="0 0 0.06"><joint name="rod" type="slide" axis="0 0 1"/>
+        <geom type="capsule" size="0.03 0.03"
         mass="1"/></body></worldbody><actuator><motor joint="rod"/></actuator></mujoco>"""
     )
     data = mujoco.MjData(model)
@@ -184,10 +191,12 @@ def test_a_rod_that_stays_in_contact_drives_waves_for_ever(frequency: float, dt:
 
 
 def test_a_body_that_rolls_slowly_leaves_a_calm_surface() -> None:
-    """Its footprint is made anew at every third of a texel, which makes noise without the filter."""
+    """The footprint changes at every third of a texel: noise without the filter."""
     model = mujoco.MjModel.from_xml_string(
-        """<mujoco><option timestep="0.002"/><worldbody><geom name="target" type="box" size="0.4 0.2 0.1"/>
-        <body pos="-0.1 0 0.15"><freejoint/><geom size="0.05" mass="0.5"/></body></worldbody></mujoco>"""
+        """<mujoco><option timestep="0.002"/><worldbody>
+        <geom name="target" type="box" size="0.4 0.2 0.1"/>
+        <body pos="-0.1 0 0.15"><freejoint/><geom size="0.05" mass="0.5"/></body></worldbody>
+        </mujoco>"""
     )
     data = mujoco.MjData(model)
     waves = WithAndWithout(model, MATERIAL, 24)
@@ -210,7 +219,7 @@ UNEVEN = (
 
 @functools.cache
 def dropped(scale: float) -> np.ndarray:
-    """Heights over the scale under a box and a ball that chatter: lengths by the scale, times by its square root."""
+    """Heights over the scale under a chattering box and ball, at lengths that scale."""
     s = scale
     t = np.sqrt(scale)
     model = mujoco.MjModel.from_xml_string(
@@ -220,7 +229,8 @@ def dropped(scale: float) -> np.ndarray:
         <geom name="target" type="mesh" mesh="uneven"/>
         <body pos="{0.05 * s} {0.02 * s} {0.3 * s}"><freejoint/>
         <geom type="box" size="{0.06 * s} {0.05 * s} {0.04 * s}" mass="{0.5 * s**3}"/></body>
-        <body pos="{-0.25 * s} {0.1 * s} {0.25 * s}"><freejoint/><geom size="{0.06 * s}" mass="{0.3 * s**3}"/></body>
+        <body pos="{-0.25 * s} {0.1 * s} {0.25 * s}"><freejoint/>
+        <geom size="{0.06 * s}" mass="{0.3 * s**3}"/></body>
         </worldbody></mujoco>"""
     )
     material = Material(t, 1 / t, 200 / s, density=100 * s, viscosity=1e-3 * s * t)

@@ -64,7 +64,7 @@ def test_ball_on_a_concave_mesh_hits_the_surface_under_it(transform: str, placin
 
 
 def test_sources_lie_where_mujocos_contacts_do_on_tumbling_concave_targets() -> None:
-    """Independent of the atlas: the contacts' force-weighted point, and the nearest point of the mesh in the world."""
+    """The contacts' mean point by force, and the nearest point of the mesh, without the atlas."""
     target = (
         '<body name="target"><freejoint/><geom name="target" type="sdf" mesh="limbed" '
         'mass="20"/></body>'
@@ -117,7 +117,7 @@ def test_second_step_at_the_same_time_does_nothing() -> None:
 
 @pytest.mark.filterwarnings("ignore:MuJoCo. compiler attribute 'settotalmass'")
 def test_seat_of_gymnasiums_humanoid_that_falls_on_its_back_ripples() -> None:
-    """A model as others write them, in anybody's loop with three lines more: an import, and two that are marked."""
+    """A model as users write it, in a loop with three more lines."""
     model = mujoco.MjModel.from_xml_path(
         str(Path(gymnasium.__file__).parent / "envs/mujoco/assets/humanoid.xml")
     )

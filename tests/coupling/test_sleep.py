@@ -18,10 +18,14 @@ def model_of(
 ) -> mujoco.MjModel:
     """Two boxes on one another, on a plate that is static, or stands on a floor."""
     return mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="0.002" sleep_tolerance="{tolerance}"><flag sleep="{flag}"/></option>
-        <default><geom solref="{solref}"/></default><worldbody><geom type="plane" size="3 3 .1" pos="0 0 -0.2"/>
-        <body>{target}<geom name="target" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1" mass="50"/></body>
-        <body pos="0 0 0.041"><freejoint/><geom name="low" type="box" size="0.06 0.05 0.04" mass="0.5"/></body>
+        f"""<mujoco><option timestep="0.002" sleep_tolerance="{tolerance}"><flag sleep="{flag}"/>
+        </option>
+        <default><geom solref="{solref}"/></default><worldbody>
+        <geom type="plane" size="3 3 .1" pos="0 0 -0.2"/>
+        <body>{target}<geom name="target" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1" mass="50"/>
+        </body>
+        <body pos="0 0 0.041"><freejoint/>
+        <geom name="low" type="box" size="0.06 0.05 0.04" mass="0.5"/></body>
         <body pos="0 0 0.122"><freejoint/><geom type="box" size="0.06 0.05 0.04" mass="0.5"/></body>
         </worldbody></mujoco>"""
     )
@@ -97,7 +101,8 @@ def test_bodies_that_start_asleep_press_from_the_beginning(depth: float) -> None
     bodies = "".join(f'<body pos="0 0 {z}" sleep="init">{box}</body>' for z in heights)
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.002"><flag sleep="enable"/></option><worldbody>
-        <geom name="target" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1"/>{bodies}</worldbody></mujoco>"""
+        <geom name="target" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1"/>{bodies}</worldbody>
+        </mujoco>"""
     )
     run = Run(model, "target", material=MATERIAL)
     [impulse] = run.step()

@@ -29,8 +29,10 @@ def draped(
     )
     return mujoco.MjSpec.from_string(
         f"""<mujoco><option timestep="{DT}" solver="CG" tolerance="1e-6" integrator="{integrator}"/>
-        <asset>{mesh_asset("animal", *limbed(0.05))}</asset><worldbody><body name="link">{body}{target}</body>
-        <flexcomp name="cloth" type="grid" count="{count}" spacing="0.04 0.04 0.04" pos="0.03 0 0.3" dim="{kind}"
+        <asset>{mesh_asset("animal", *limbed(0.05))}</asset><worldbody>
+        <body name="link">{body}{target}</body>
+        <flexcomp name="cloth" type="grid" count="{count}" spacing="0.04 0.04 0.04"
+          pos="0.03 0 0.3" dim="{kind}"
           mass="{MASS}" radius="0.005">{edge}
         <contact selfcollide="none" condim="1" solref="0.01 1" {contact}/></flexcomp>
         </worldbody></mujoco>"""

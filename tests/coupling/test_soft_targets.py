@@ -16,16 +16,21 @@ from ripple_sim.solver import Load, Material
 SOFT = Material(speed=1.0, density=5.0, damping=2.0, stiffness=100.0)
 HEAD = '<option timestep="0.001" solver="CG" tolerance="1e-8"/><size memory="20M"/>'
 JELLY = f"""<mujoco>{HEAD}<worldbody>
-<flexcomp name="jelly" type="grid" count="4 4 4" spacing=".1 .1 .1" pos="0 0 .2" dim="3" radius=".005" dof="trilinear"
- mass="5"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3" damping=".02"/></flexcomp>
+<flexcomp name="jelly" type="grid" count="4 4 4" spacing=".1 .1 .1" pos="0 0 .2" dim="3"
+  radius=".005" dof="trilinear"
+ mass="5"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3" damping=".02"/>
+ </flexcomp>
 <geom type="plane" size="3 3 .1" pos="0 0 .04"/>
-<body name="ball" pos="0.03 0.02 .45"><freejoint/><geom name="ball" type="sphere" size=".06" mass=".4"/></body>
+<body name="ball" pos="0.03 0.02 .45"><freejoint/>
+<geom name="ball" type="sphere" size=".06" mass=".4"/></body>
 </worldbody></mujoco>"""
 CLOTH = f"""<mujoco>{HEAD}<worldbody>
-<flexcomp name="cloth" type="grid" count="6 6 1" spacing=".1 .1 .1" pos="0 0 1" dim="2" radius=".01" mass="1">
+<flexcomp name="cloth" type="grid" count="6 6 1" spacing=".1 .1 .1" pos="0 0 1" dim="2"
+  radius=".01" mass="1">
 <contact selfcollide="none"/><edge equality="true" damping=".01"/>
 <pin id="0 1 2 3 4 5 6 11 12 17 18 23 24 29 30 31 32 33 34 35"/></flexcomp>
-<body name="ball" pos="0 0 1.2"><freejoint/><geom name="ball" type="sphere" size=".06" mass=".4"/></body>
+<body name="ball" pos="0 0 1.2"><freejoint/><geom name="ball" type="sphere" size=".06" mass=".4"/>
+</body>
 </worldbody></mujoco>"""
 
 
@@ -53,9 +58,11 @@ def skinned() -> str:
 <body name="near"><geom name="upper" type="capsule" fromto="-.5 0 0 0 0 0" size=".05"/>
 <body name="far"><joint name="elbow" type="hinge" axis="0 0 1" damping="1"/>
 <geom name="lower" type="capsule" fromto="0 0 0 .5 0 0" size=".05" mass="2"/></body></body>
-<body name="ball" pos="-.25 0 .3"><freejoint/><geom name="ball" type="sphere" size=".04" mass=".2"/></body>
+<body name="ball" pos="-.25 0 .3"><freejoint/><geom name="ball" type="sphere" size=".04" mass=".2"/>
+</body>
 </worldbody><deformable><skin name="arm" vertex="{" ".join(f"{each:g}" for each in V.ravel())}"
-face="{" ".join(str(each) for triangle in F for each in triangle)}">{bones}</skin></deformable></mujoco>"""
+face="{" ".join(str(each) for triangle in F for each in triangle)}">{bones}</skin></deformable>
+</mujoco>"""
 
 
 def begun(xml: str, name: str) -> Run:
@@ -90,14 +97,16 @@ def test_an_open_stiffness_suits_the_given_speed():
 
 
 HAMMOCK = f"""<mujoco>{HEAD}<worldbody>
-<flexcomp name="cloth" type="grid" count="9 9 1" spacing=".05 .05 .05" pos="0 0 .5" dim="2" radius=".005" mass=".5">
+<flexcomp name="cloth" type="grid" count="9 9 1" spacing=".05 .05 .05" pos="0 0 .5" dim="2"
+  radius=".005" mass=".5">
 <contact selfcollide="none"/><edge equality="true" damping=".01"/><pin id="0 8 72 80"/></flexcomp>
-<body name="ball" pos=".01 .02 .655"><freejoint/><geom name="ball" type="sphere" size=".05" mass=".1"/></body>
+<body name="ball" pos=".01 .02 .655"><freejoint/>
+<geom name="ball" type="sphere" size=".05" mass=".1"/></body>
 </worldbody></mujoco>"""
 
 
 def test_a_cloth_that_wraps_round_a_ball_is_pressed_by_more_than_the_ball_loses(recwarn):
-    """Forces on its slopes cancel as vectors, and those are exact; the surface gets the amounts of the normal ones."""
+    """Forces on slopes cancel as vectors; the surface gets the sum of the normal forces."""
     run = begun(HAMMOCK, "cloth")
     model = run.model
     data = run.data
@@ -169,7 +178,8 @@ def test_open_coefficients_are_chosen_by_the_model():
 def test_a_geom_moved_by_hand_takes_its_contacts_along():
     model = mujoco.MjModel.from_xml_string(
         """<mujoco><worldbody><geom name="target" type="sphere" size=".2"/>
-        <body pos="0 0 .26"><freejoint/><geom name="ball" type="sphere" size=".05"/></body></worldbody></mujoco>"""
+        <body pos="0 0 .26"><freejoint/><geom name="ball" type="sphere" size=".05"/></body>
+        </worldbody></mujoco>"""
     )
     data = mujoco.MjData(model)
     ripples = Ripples(model, {"target": SOFT}, resolution=8)
@@ -183,8 +193,10 @@ def test_a_geom_moved_by_hand_takes_its_contacts_along():
 
 def flexed(dof: str) -> tuple[mujoco.MjModel, Ripples, SoftSurface]:
     model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><worldbody><flexcomp name="jelly" type="grid" count="3 3 3" spacing=".1 .1 .1" dim="3" dof="{dof}"
-        radius=".005" mass="5"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3"/></flexcomp>
+        f"""<mujoco><worldbody>
+        <flexcomp name="jelly" type="grid" count="3 3 3" spacing=".1 .1 .1" dim="3" dof="{dof}"
+        radius=".005" mass="5"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3"/>
+        </flexcomp>
         </worldbody></mujoco>"""
     )
     ripples = Ripples(

@@ -18,12 +18,15 @@ DT = 0.001
 
 
 def throw(solver: str, tolerance: float, target: float) -> tuple[float, list[str]]:
-    """Share of a box's contact forces on a target of a mass [kg] that its momentum does not show, and warnings."""
+    """Share of a box's force missing in a target's momentum, and warnings; target mass in kg."""
     model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="{DT}" tolerance="{tolerance}" solver="{solver}" iterations="1000"
+        f"""<mujoco>
+        <option timestep="{DT}" tolerance="{tolerance}" solver="{solver}" iterations="1000"
         gravity="0 0 0"/>
-        <worldbody><body><freejoint/><geom name="target" type="sphere" size="0.5" mass="{target}"/></body>
-        <body pos="0.1 0 0.54"><freejoint/><geom type="box" size="0.05 0.04 0.03" mass="{MASS}"/></body>
+        <worldbody><body><freejoint/><geom name="target" type="sphere" size="0.5" mass="{target}"/>
+        </body>
+        <body pos="0.1 0 0.54"><freejoint/><geom type="box" size="0.05 0.04 0.03" mass="{MASS}"/>
+        </body>
         </worldbody></mujoco>"""
     )
     data = mujoco.MjData(model)
@@ -64,11 +67,15 @@ def test_a_solver_that_has_converged_is_not_warned_of(solver: str) -> None:
     assert not messages
 
 
-TREES = """<mujoco><option gravity="0 0 0" timestep="0.001"/><worldbody><geom name="still" size="0.1"/>
+TREES = """<mujoco><option gravity="0 0 0" timestep="0.001"/><worldbody>
+<geom name="still" size="0.1"/>
 <body pos="1 0 0"><freejoint/><geom size="0.1" pos="0.2 0.1 0"/>
-  <body pos="0.5 0 0"><joint type="hinge" axis="0 1 0"/><geom type="box" size="0.1 0.2 0.1" pos="0 0 0.4"/>
-    <body pos="0 0 0.5"><joint type="ball"/><geom type="capsule" size="0.1 0.2" pos="0.1 0.3 0"/></body></body></body>
-<body pos="-2 0 1"><joint type="slide" axis="0 0 1"/><geom size="0.2" pos="0 0.3 0"/></body></worldbody></mujoco>"""
+  <body pos="0.5 0 0"><joint type="hinge" axis="0 1 0"/>
+  <geom type="box" size="0.1 0.2 0.1" pos="0 0 0.4"/>
+    <body pos="0 0 0.5"><joint type="ball"/><geom type="capsule" size="0.1 0.2" pos="0.1 0.3 0"/>
+    </body></body></body>
+<body pos="-2 0 1"><joint type="slide" axis="0 0 1"/><geom size="0.2" pos="0 0.3 0"/></body>
+</worldbody></mujoco>"""
 
 
 def rows_of(pairs: np.ndarray) -> np.ndarray:
@@ -231,9 +238,11 @@ def test_geoms_that_pass_a_flex_or_are_thrown_aside_got_a_warning(kind: str, sol
     slab = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
     V, F = trimesh.remesh.subdivide_to_size(slab.vertices, slab.faces, 0.06)
     spec = mujoco.MjSpec.from_string(
-        f"""<mujoco><option timestep="0.002" gravity="0 0 0"/><default><geom solref="{solref}" condim="3"/></default>
+        f"""<mujoco><option timestep="0.002" gravity="0 0 0"/><default>
+        <geom solref="{solref}" condim="3"/></default>
         <asset>{mesh_asset("m", V, F)}</asset><worldbody><geom name="slab" type="mesh" mesh="m"/>
-        <body name="body" pos="-0.03 0.01 0.26"><freejoint/><geom type="{kind}" size="0.05 0.04" mass="0.3"/></body>
+        <body name="body" pos="-0.03 0.01 0.26"><freejoint/>
+        <geom type="{kind}" size="0.05 0.04" mass="0.3"/></body>
         </worldbody></mujoco>"""
     )
     make_collidable(spec, "slab", "flex")

@@ -107,7 +107,8 @@ def test_too_little_memory_names_what_to_enlarge() -> None:
         ripples.mj_step(data)
 
 
-MODEL = """<mujoco><option integrator="{}"><flag fwdinv="{}"/></option><worldbody><geom type="plane" size="1 1 1"/>
+MODEL = """<mujoco><option integrator="{}"><flag fwdinv="{}"/></option><worldbody>
+<geom type="plane" size="1 1 1"/>
 <body pos="0 0 0.1"><freejoint/><geom size="0.1"/></body></worldbody>
 <keyframe><key time="3.5"/></keyframe></mujoco>"""
 
@@ -165,7 +166,8 @@ def test_automatic_resets_are_seen_without_a_mark() -> None:
     assert goes_on(clock, model, data)
 
 
-TUMBLING = """<mujoco><option solver="{}" integrator="{}" noslip_iterations="{}"><flag sleep="{}"/></option><worldbody>
+TUMBLING = """<mujoco><option solver="{}" integrator="{}" noslip_iterations="{}"><flag sleep="{}"/>
+</option><worldbody>
 <geom type="plane" size="2 2 1"/><geom type="box" size="0.6 0.1 0.1" pos="0 0.2 0.1"/>
 <body pos="0 0 0.2"><freejoint/><geom type="box" size="0.1 0.08 0.06"/></body>
 <body pos="0.05 0 0.4"><freejoint/><geom type="capsule" size="0.05 0.1"/>

@@ -23,7 +23,8 @@ from ripple_sim.scene import MaterialEntry
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.texels import half_thickness
 
-BOX = """<mujoco><option timestep="0.002"/><worldbody><geom name="target" type="box" size="0.5 0.5 0.25"/>
+BOX = """<mujoco><option timestep="0.002"/><worldbody>
+<geom name="target" type="box" size="0.5 0.5 0.25"/>
     <body pos="0 0 0.36"><freejoint/><geom type="box" size="0.15 0.15 0.1" mass="{mass}"/></body>
     </worldbody></mujoco>"""
 
@@ -64,7 +65,8 @@ def test_the_preset_suited_takes_its_size_and_a_typical_hit_from_the_model(tmp_p
 
 
 # a ball of 0.14 times the target's size, from a height of half the size
-FALL = """<mujoco><option timestep="{dt}"/><worldbody><geom name="target" type="sphere" size="{half}"/>
+FALL = """<mujoco><option timestep="{dt}"/><worldbody>
+<geom name="target" type="sphere" size="{half}"/>
     <body pos="0 0 {start}"><freejoint/><geom type="sphere" size="{radius}" density="500"/></body>
     </worldbody></mujoco>"""
 
@@ -82,9 +84,7 @@ def highest(
     return top, run.ripples
 
 
-def test_a_heavy_box_comes_to_rest_in_a_shallow_pit_and_density_makes_up_for_a_given_stiffness() -> (
-    None
-):
+def test_a_heavy_box_rests_in_a_shallow_pit_and_density_makes_up_for_a_given_stiffness() -> None:
     model = mujoco.MjModel.from_xml_string(BOX.format(mass=20))
     top, ripples = highest(model, Material(), 1.5, resolution=24)
     assert 1e-5 < top < 0.01
@@ -105,8 +105,10 @@ def test_waves_suit_the_target_at_every_scale(size: float) -> None:
 
 
 def test_density_is_the_bodys_mass_over_the_targets_area_where_nothing_can_touch_it() -> None:
-    xml = """<mujoco><worldbody><geom name="still" type="sphere" size="0.3" contype="2" conaffinity="2"/>
-    <body pos="0 0 2"><freejoint/><geom name="free" type="sphere" size="0.5" mass="7"/></body></worldbody></mujoco>"""
+    xml = """<mujoco><worldbody>
+    <geom name="still" type="sphere" size="0.3" contype="2" conaffinity="2"/>
+    <body pos="0 0 2"><freejoint/><geom name="free" type="sphere" size="0.5" mass="7"/></body>
+    </worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(xml)
     chosen = Material()
     ripples = Ripples(model, {"still": chosen, "free": chosen}, resolution=8, backend="cpu")
@@ -132,8 +134,10 @@ def test_long_steps_have_less_stiffness() -> None:
 
 # a ball that falls hard, from many times its size, on something heavy
 FROM_HIGH = """<mujoco><option timestep="{dt}"/><worldbody><geom type="plane" size="9 9 1"/>
-    <body pos="0 0 3"><freejoint/><geom name="target" size="0.15" density="1000" solref="0.004 0.5"/></body>
-    <body pos="0.05 0 0.6"><freejoint/><geom type="box" size="0.4 0.4 0.2" mass="90"/></body></worldbody></mujoco>"""
+    <body pos="0 0 3"><freejoint/>
+    <geom name="target" size="0.15" density="1000" solref="0.004 0.5"/></body>
+    <body pos="0.05 0 0.6"><freejoint/><geom type="box" size="0.4 0.4 0.2" mass="90"/></body>
+    </worldbody></mujoco>"""
 
 
 def cheetah(dt: float | None = None) -> mujoco.MjModel:
@@ -200,9 +204,12 @@ def test_warning_about_a_surface_too_heavy_for_light_bodies() -> None:
 
 
 # a robot of 200 kg that stands, or falls on its trunk, and a ball of 50 g
-ROBOT = """<mujoco><option timestep="0.002"/><worldbody><geom type="plane" size="9 9 1" pos="0 0 -0.4"/>
-    <body><freejoint/><geom name="target" type="capsule" size="0.15 0.25" zaxis="1 0 0" mass="199"/>{legs}</body>
-    <body pos="{x} 0 0.35"><freejoint/><geom name="ball" size="0.04" mass="0.05"/></body></worldbody></mujoco>"""
+ROBOT = """<mujoco><option timestep="0.002"/><worldbody>
+<geom type="plane" size="9 9 1" pos="0 0 -0.4"/>
+    <body><freejoint/>
+    <geom name="target" type="capsule" size="0.15 0.25" zaxis="1 0 0" mass="199"/>{legs}</body>
+    <body pos="{x} 0 0.35"><freejoint/><geom name="ball" size="0.04" mass="0.05"/></body>
+    </worldbody></mujoco>"""
 LEGS = '<geom type="box" size="0.2 0.2 0.1" pos="0 0 -0.3" mass="1"/>'
 
 
@@ -264,8 +271,10 @@ def test_a_heavier_body_is_met_by_a_heavier_surface() -> None:
     )
 
 
-EGG = """<mujoco><option timestep="{dt}"/><worldbody><geom name="egg" type="ellipsoid" size="{a} {a} {b}"/>
-    <body pos="0 0 {start}"><freejoint/><geom type="sphere" size="{ball}"/></body></worldbody></mujoco>"""
+EGG = """<mujoco><option timestep="{dt}"/><worldbody>
+<geom name="egg" type="ellipsoid" size="{a} {a} {b}"/>
+    <body pos="0 0 {start}"><freejoint/><geom type="sphere" size="{ball}"/></body></worldbody>
+    </mujoco>"""
 
 
 def chosen(material: Material, scale: float = 1.0, dt: float = 0.002, ball: float = 0.1) -> Ripples:
@@ -326,7 +335,8 @@ def test_dents_stay_small_and_rings_are_seen(share: float) -> None:
     """A ball of a share of a sphere's size falls on it from the height of its size."""
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><worldbody><geom name="target" type="sphere" size="0.5"/>
-        <body pos="0.01 0.02 {1.5 + share / 2}"><freejoint/><geom size="{share / 2}"/></body></worldbody></mujoco>"""
+        <body pos="0.01 0.02 {1.5 + share / 2}"><freejoint/><geom size="{share / 2}"/></body>
+        </worldbody></mujoco>"""
     )
     run = Run(model, "target", material=Material(), resolution=32, conserve_volume=True)
     waves = run.ripples["target"]
@@ -347,7 +357,8 @@ BALL = """<mujoco><option timestep="0.002"/><worldbody>
     <body pos="0 0 0.56"><freejoint/><geom type="sphere" size="0.05" mass="0.36"/></body>
     </worldbody></mujoco>"""
 
-ON_ANIMAL = f"""<mujoco><option timestep="0.002" sdf_initpoints="8"/><asset>{limbed_asset()}</asset><worldbody>
+ON_ANIMAL = f"""<mujoco><option timestep="0.002" sdf_initpoints="8"/><asset>{limbed_asset()}</asset>
+<worldbody>
     <geom name="target" type="sdf" mesh="limbed"/>
     <body pos="0.03 0 0.55"><freejoint/><geom type="sphere" size="0.05" mass="1.7"/></body>
     </worldbody></mujoco>"""
@@ -457,7 +468,7 @@ def test_a_crest_of_any_step_is_reported(before: int, after: int, end: str) -> N
     ripples.mj_step(data, nstep=after)
     if end == "new material":
         ripples.change_material("target", damping=2.0)
-    with pytest.warns(RippleWarning, match="0.4 m at .* radius is 0.5 m"):
+    with pytest.warns(RippleWarning, match=r"0.4 m at .* radius is 0.5 m"):
         if end == "reset":
             ripples.reset()
         else:
@@ -480,7 +491,7 @@ def test_steep_waves_are_reported_although_they_are_low() -> None:
     data, ripples = still_ripples(Material(speed=1e-3, damping=0.0, stiffness=0.0, density=1.0))
     z = ripples["target"].atlas.positions[..., 2]
     ripples["target"].height = (0.05 * np.sin(40 * z)).astype(np.float32)
-    with pytest.warns(RippleWarning, match="too steep: a slope of 1.* on "):
+    with pytest.warns(RippleWarning, match=r"too steep: a slope of 1.* on "):
         ripples.mj_step(data, nstep=80)
 
 

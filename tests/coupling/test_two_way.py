@@ -1,4 +1,4 @@
-"""Two-way coupling: what a risen surface reaches is pushed, and what one gains the other loses; support points."""
+"""Two-way coupling: a risen surface pushes bodies, and momentum is conserved."""
 
 from collections.abc import Callable
 
@@ -22,12 +22,13 @@ def ring(
     gap: float = -1e-4,
     gravity: float = GRAVITY,
 ):
-    """Let a ring run to a ball on a block, or above it: heights, and over time both momenta and the speed under it."""
+    """A ring reaches a ball on or above a block: heights, momenta and speed over time."""
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.001" gravity="0 0 {-gravity}"/><worldbody>
         <body name="block" pos="0 0 -0.2">{target}
         <geom name="block" type="box" size="0.5 0.5 0.2" mass="5"/></body>
-        <body name="ball" pos="0 0 {0.05 + gap}"><freejoint/><geom name="ball" size="0.05" mass="{mass}"/></body>
+        <body name="ball" pos="0 0 {0.05 + gap}"><freejoint/>
+        <geom name="ball" size="0.05" mass="{mass}"/></body>
         </worldbody></mujoco>"""
     )
     run = Run(
@@ -91,7 +92,8 @@ def test_ball_is_never_thrown_faster_than_the_surface_moves() -> None:
 def touching(geoms: str, gravity: float = -GRAVITY, **options: object) -> Run:
     """A body on a block that may push back."""
     model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option gravity="0 0 {gravity}"/><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
+        f"""<mujoco><option gravity="0 0 {gravity}"/><worldbody>
+        <geom name="block" type="box" size="0.5 0.5 0.2"/>
         <body name="ball" pos="0 0 0.2499"><freejoint/>{geoms}</body></worldbody></mujoco>"""
     )
     return Run(model, "block", resolution=16, two_way=True, **options)
@@ -115,7 +117,7 @@ FORCE = np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def test_forces_of_others_stay_theirs() -> None:
-    """Set once, or assigned before each step, which wiped out the push, or taken back and added anew."""
+    """A force of the user's is set once, assigned before each step, or removed and set again."""
 
     def assigned(data: mujoco.MjData) -> None:
         data.xfrc_applied[:] = 0.0
@@ -142,7 +144,7 @@ def test_nothing_is_left_after_a_reset() -> None:
 
 
 def test_a_body_that_touches_twice_is_pushed_once() -> None:
-    """Two of its geoms on the same patch together do not make it faster than the surface, nor than one of them."""
+    """Two geoms on one patch do not make a body faster than the surface."""
     speeds = []
     for geoms in ('<geom size="0.05" mass="0.002"/>', 2 * '<geom size="0.05" mass="0.001"/>'):
         run = touching(geoms, gravity=0.0, density=20.0)
@@ -153,7 +155,7 @@ def test_a_body_that_touches_twice_is_pushed_once() -> None:
 
 
 def test_ripple_reaches_a_ball_above_it_only_as_high_as_the_wave() -> None:
-    """MuJoCo sees no contact; the ball is met by the displaced surface, and what it gains the surface loses."""
+    """MuJoCo sees no contact; the displaced surface hits the ball, and loses what it gains."""
     heights, total = ring(two_way=True, speed=4.0, mass=0.05, gap=0.004, gravity=0.0)
     assert heights[-1] > 0.05
     _, ball, surface, _ = total.T

@@ -1,4 +1,4 @@
-"""Two-way coupling under MuJoCo's options: all solvers find the same forces, bodies sleep and wake, RK4 is refused."""
+"""Two-way coupling with MuJoCo's options: solvers agree, bodies sleep, RK4 is refused."""
 
 import itertools
 
@@ -20,15 +20,17 @@ CALM = Material(speed=2.0, density=20.0, stiffness=2000.0, damping=150.0)
 def coupled(option: str, bodies: str, material: Material) -> Run:
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.002" {option}</option><worldbody>
-        <geom name="target" type="box" size="1 1 0.1" pos="0 0 -0.1"/>{bodies}</worldbody></mujoco>"""
+        <geom name="target" type="box" size="1 1 0.1" pos="0 0 -0.1"/>{bodies}</worldbody>
+        </mujoco>"""
     )
     return Run(model, "target", material=material, resolution=12, two_way=True)
 
 
 def falling(option: str) -> tuple[Run, float, float]:
-    """A ball and a box after a fall on a light surface; greatest energy over that of the start, and impulse [N s]."""
+    """A ball and a box fall on a light surface: greatest over initial energy, impulse [N s]."""
     bodies = """<body pos="0 0 0.07"><freejoint/><geom size="0.05" mass="0.05"/></body>
-        <body pos="0.4 0 0.07"><freejoint/><geom type="box" size="0.05 0.05 0.05" mass="0.05"/></body>"""
+        <body pos="0.4 0 0.07"><freejoint/><geom type="box" size="0.05 0.05 0.05" mass="0.05"/>
+        </body>"""
     run = coupled(option, bodies, LIGHT)
     start = most = run.ripples.energy(run.data).total
     for _ in range(60):
@@ -67,8 +69,10 @@ def test_runge_kutta_is_refused_when_it_is_given_and_when_it_is_chosen_later() -
         Ripples(run.model, {"target": LIGHT}, resolution=12, two_way=True)
 
 
-STACK = """<body pos="0 0 0.05" {sleep}><freejoint/><geom type="box" size="0.1 0.1 0.05" mass="2"/></body>
-    <body pos="0 0.02 0.149" {sleep}><freejoint/><geom type="box" size="0.05 0.05 0.05" mass="0.5"/></body>"""
+STACK = """<body pos="0 0 0.05" {sleep}><freejoint/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
+</body>
+    <body pos="0 0.02 0.149" {sleep}><freejoint/><geom type="box" size="0.05 0.05 0.05" mass="0.5"/>
+    </body>"""
 AT_REST = 0.8
 
 

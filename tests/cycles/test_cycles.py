@@ -1,4 +1,4 @@
-"""Frames by Cycles: what Blender is told, what becomes of its frames, and what is said where it is missing or fails.
+"""Frames by Cycles: Blender's settings, its frames, and messages where it fails.
 
 A small program stands in for Blender, which few machines that run the tests have.
 """
@@ -22,7 +22,8 @@ pytest.importorskip("pxr")
 
 MODEL = """<mujoco><worldbody><light pos="1 0 2" dir="-1 0 -2" diffuse="1 1 1"/>
 <geom type="plane" name="ground" size="9 9 .1" rgba="1 1 1 1"/>
-<geom name="egg" size="0.2" pos="0 0 0.2"/><body pos="0 0 0.6"><freejoint/><geom size="0.05"/></body>
+<geom name="egg" size="0.2" pos="0 0 0.2"/><body pos="0 0 0.6"><freejoint/><geom size="0.05"/>
+</body>
 </worldbody></mujoco>"""
 
 # makes frames of its settings: as bright as their numbers, of the size that is asked for
@@ -40,7 +41,8 @@ for number in range(settings["frames"]):
     if number == {fails}:
         sys.exit("out of memory")
     width, height = settings["size"]
-    np.save(Path(settings["folder"], f"{{number}}.npy"), np.full((height, width, 3), 0.2 * number, np.float32))
+    picture = np.full((height, width, 3), 0.2 * number, np.float32)
+    np.save(Path(settings["folder"], f"{{number}}.npy"), picture)
     print("Blender's own words")
     print(f"frame {{number}}", flush=True)
 """
@@ -157,7 +159,7 @@ def test_a_blender_that_cannot_be_used_is_named(
     monkeypatch.setenv(PYTHON, str(tmp_path / "none"))
     refused("cannot be run")
     stand_in(tmp_path, monkeypatch, version="4 4 0")
-    refused(r"has bpy 4\.4\.0; valid is 5\.0 or later: .*'bpy>=5\.0'")
+    refused(r"must have bpy 5\.0 or later, got 4\.4\.0: .*'bpy>=5\.0'")
     monkeypatch.setenv(PYTHON, str(program := tmp_path / "python"))
     program.write_text(f"#!{sys.executable}\nraise ImportError('libSM.so.6: no such file')\n")
     program.chmod(0o755)

@@ -1,4 +1,4 @@
-"""What is installed is the source tree: pyproject.toml names packages one by one, and one is soon forgotten."""
+"""The installed packages are the source tree: pyproject.toml lists every package."""
 
 import re
 import tomllib
@@ -81,7 +81,8 @@ def test_waves_need_nothing_of_posix_and_videos_no_viewer(tmp_path):
         from ripple_sim import Material, Ripples
         model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom name="egg" size="0.3"/>'
             '<body pos="0 0 0.36"><freejoint/><geom size="0.06"/></body></worldbody></mujoco>')
-        data, ripples = mujoco.MjData(model), Ripples(model, {{"egg": Material()}}, resolution=8, backend="cpu")
+        data = mujoco.MjData(model)
+        ripples = Ripples(model, {{"egg": Material()}}, resolution=8, backend="cpu")
         for _ in range(50):
             ripples.mj_step(data)
         assert abs(ripples["egg"].height).max() > 0

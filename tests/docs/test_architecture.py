@@ -1,4 +1,4 @@
-"""The page on the architecture is about the code as it is; on a small tree whose imports are known, what makes it."""
+"""The architecture page matches the code, and its program is right on a small tree."""
 
 import importlib
 import re

@@ -15,12 +15,18 @@ ROOT = Path(__file__).parents[2]
 GLOSSARY = ROOT / "docs" / "glossary.md"
 
 # what is said: the retired words, or words one after the other
-INSTEAD = """height map: relief reliefs; footprint cache: footing; reusable: used_before; reach: hovering;
-scratch: nowhere everywhere_infinite; contact load: felt press presses pressed; deficit: owed owing debt;
-unsupported: undrawn; visual: piece pieces; transparent visual: clear_body; halo: ring padded; movable: carries carried;
-tunnelling: speed_check check_speeds; flex collider: shell shells; target: ripple_surface; ripple renderer: pictures;
-shutter times: moments; render settings: job; double buffering: pipeline; prefetch: ahead; resources: owned;
-octahedral encoding: folded unfolded; unpack: parted; tone mapping: development developed; shadow bias: lift"""
+INSTEAD = """height map: relief reliefs; footprint cache: footing; reusable: used_before;
+reach: hovering;
+scratch: nowhere everywhere_infinite; contact load: felt press presses pressed;
+deficit: owed owing debt;
+unsupported: undrawn; visual: piece pieces; transparent visual: clear_body; halo: ring padded;
+movable: carries carried;
+tunnelling: speed_check check_speeds; flex collider: shell shells; target: ripple_surface;
+ripple renderer: pictures;
+shutter times: moments; render settings: job; double buffering: pipeline; prefetch: ahead;
+resources: owned;
+octahedral encoding: folded unfolded; unpack: parted; tone mapping: development developed;
+shadow bias: lift"""
 RETIRED = {
     word: each.split(":")[0]
     for each in re.split(r";\s", INSTEAD)

@@ -1,4 +1,4 @@
-"""The pages on scene files and on Python say what the code does, and that on troubleshooting what the program says."""
+"""The reference pages match the code, and troubleshooting quotes the program's messages."""
 
 import importlib
 import importlib.util
@@ -68,7 +68,10 @@ def test_the_pages_have_every_public_name() -> None:
 
 @pytest.mark.parametrize("path", objects())
 def test_parameters_that_share_a_line_share_a_default(path: str) -> None:
-    """The page gives all names on a line the first one's default: an operator once was \"auto\", a height 1280."""
+    """All names on a line of the page have the default of the first.
+
+    An operator once was \"auto\", a height 1280.
+    """
     thing = named(path)
     methods = inspect.getmembers(thing, inspect.isroutine) if inspect.isclass(thing) else []
     for each in [thing, *(method for _, method in methods)]:

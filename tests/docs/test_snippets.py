@@ -1,4 +1,4 @@
-"""What the pages say can be typed in: every block of code runs, every command and every file that is named is there.
+"""Documentation: every block of code and command runs, and every file exists.
 
 Blocks of a page run in their order, in one folder and one Python namespace, as a reader would type
 them. A block with a title is a file of that name. TOML without a title is added to the page's last
@@ -39,7 +39,8 @@ MODEL = """<mujoco><worldbody>
   <geom name="floor" type="plane" size="2 2 1"/>
   <geom name="egg" type="ellipsoid" size="0.4 0.3 0.3" pos="0 0 0.3"/>
   <body name="ball" pos="0.1 0 1"><freejoint/><geom size="0.06"/></body>
-  <body name="torso" pos="2 0 1"><freejoint/><geom name="torso" type="box" size="0.2 0.1 0.1"/></body>
+  <body name="torso" pos="2 0 1"><freejoint/><geom name="torso" type="box" size="0.2 0.1 0.1"/>
+  </body>
   <body name="head" pos="4 0 1"><freejoint/>
     <geom name="head" type="sphere" size="0.2" contype="0" conaffinity="0" mass="0"/>
     <geom name="hull0" type="sphere" size="0.19" pos="0.01 0 0" mass="5"/>

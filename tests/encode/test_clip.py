@@ -66,7 +66,7 @@ def plain(colors: list) -> np.ndarray:
 
 
 def striped(count: int) -> np.ndarray:
-    """Black and white, and a stripe that moves: few enough colours for a palette to hold them all."""
+    """Black and white, and a stripe that moves: few colours, which a palette holds."""
     frames = np.zeros((count, HEIGHT, WIDTH, 3), np.uint8)
     frames[:, HEIGHT // 2 :] = 255
     for number, frame in enumerate(frames):
@@ -84,7 +84,7 @@ def test_the_lossless_codec_keeps_noise_bit_for_bit(tmp_path: Path) -> None:
 def test_joined_clips_are_one_stream_with_every_frame_at_its_time(
     tmp_path: Path, codec: Codec, fps: int
 ) -> None:
-    """Matroska and WebM round times to milliseconds, a quarter of a frame at 240 frames a second."""
+    """Matroska and WebM round times to milliseconds, a quarter of a frame at 240 Hz."""
     levels = [20, 60, 100, 140, 180, 220]
     parts = in_parts(tmp_path, codec, plain(levels), [3, 2, 1], Stream(WIDTH, HEIGHT, fps))
     join_clips(parts, tmp_path / "whole", codec.container, fps)
@@ -164,8 +164,12 @@ def chunks(content: bytes) -> list[tuple[bytes, bytes]]:
 def test_whole_milliseconds_do_not_drift(tmp_path: Path, fps: int) -> None:
     [still] = stills(tmp_path, noise(1, 16, 16, 3))
     join_webp([still] * 100, tmp_path / "whole", Stream(16, 16, fps))
-    shown = [struct.unpack("<I", body[12:15] + b"\0")[0] for name, body in chunks((tmp_path / "whole").read_bytes())
-             if name == b"ANMF"]  # fmt: skip
+    whole = (tmp_path / "whole").read_bytes()
+    shown = [
+        struct.unpack("<I", body[12:15] + b"\0")[0]
+        for name, body in chunks(whole)
+        if name == b"ANMF"
+    ]
     assert len(shown) == 100
     assert np.abs(np.cumsum(shown) - 1000 * np.arange(1, 101) / fps).max() <= 0.5
 

@@ -1,4 +1,4 @@
-"""Image files: linear light as the shaders reckon it, whole in EXR frames or refused in time; and files of passes."""
+"""Image files: linear light, complete EXR frames, early refusals, and files of passes."""
 
 import dataclasses
 import json
@@ -84,7 +84,7 @@ def test_values_come_back_bit_for_bit_under_a_header_that_names_their_colours(
 
 
 def test_bytes_for_the_screen_are_no_linear_light(exr: None, tmp_path: Path) -> None:
-    refused = pytest.raises(VideoError, match=r"frame is uint8 .*; valid is float16 \[48, 64, 3\]")
+    refused = pytest.raises(VideoError, match=r"frame must be float16 \[48, 64, 3\], got uint8")
     size = {"width": WIDTH, "height": HEIGHT, "fps": 24}
     with refused, open_writer(tmp_path / "frames", **size, frame_format="exr") as writer:
         writer.write(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
@@ -205,7 +205,7 @@ def test_reflections_and_clear_bodies_are_mixed_in_linear_light(opengl: None) ->
 
 
 def test_light_is_multiplied_by_opacity_so_that_it_lies_over_any_background(opengl: None) -> None:
-    """The frame is the cut-out over the empty scene, by the compositor's rule: a + (1 - alpha) b."""
+    """The frame is the cut-out over the empty scene: a + (1 - alpha) b."""
     whole, empty = (
         render(bodies, linear=True).astype(float) for bodies in (BODIES, "<geom size='1e-3'/>")
     )

@@ -40,20 +40,20 @@ def test_the_limits_themselves_and_default_rates_are_valid(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("name", "size", "fps", "message"),
     [
-        ("clip.avi", (1280, 720), 60, r"\.avi.*valid is \.mp4, \.webm, \.gif, \.webp"),
+        ("clip.avi", (1280, 720), 60, r"\.avi.*must be \.mp4, \.webm, \.gif, \.webp"),
         (".mp4", (1280, 720), 60, r"\.mp4', which is not a file name"),
-        ("clip.", (1280, 720), 60, r"ends in \.; valid"),
-        ("..", (1280, 720), 60, "valid is .mp4"),
+        ("clip.", (1280, 720), 60, r"ends in \.; it must be"),
+        ("..", (1280, 720), 60, "must be .mp4"),
         ("clip.mp4", (1281, 720), 60, "1281x720.*even.*1282x720"),
         ("clip.webm", (1280, 719), 60, "1280x719.*even.*1280x720"),
-        ("clip.gif", (0, 720), 25, "0x720.*valid is 16"),
-        ("frames", (15, 16), 60, "15x16; valid is 16 to 8192"),
-        ("frames", (16, 8193), 60, "16x8193; valid is 16 to 8192"),
-        ("frames", (64.0, 48), 60, r"64\.0x48; valid is 16 to 8192"),
-        ("clip.mp4", (1280, 720), 0, "rate is 0.*1 to 240"),
-        ("clip.webp", (64, 48), 241, "frame rate is 241; .* 1 to 240"),
-        ("clip.gif", (64, 48), 51, "a GIF's frame rate is 51; .* 1 to 50"),
-        ("frames", (64, 48), 30.0, r"frame rate is 30\.0; valid is a whole number"),
+        ("clip.gif", (0, 720), 25, "must be 16 .*, got 0x720"),
+        ("frames", (15, 16), 60, "must be 16 to 8192 .*, got 15x16"),
+        ("frames", (16, 8193), 60, "must be 16 to 8192 .*, got 16x8193"),
+        ("frames", (64.0, 48), 60, r"must be 16 to 8192 .*, got 64\.0x48"),
+        ("clip.mp4", (1280, 720), 0, "rate must be .* 1 to 240 .*, got 0"),
+        ("clip.webp", (64, 48), 241, "frame rate must be .* 1 to 240 .*, got 241"),
+        ("clip.gif", (64, 48), 51, "a GIF's frame rate must be .* 1 to 50 .*, got 51"),
+        ("frames", (64, 48), 30.0, r"frame rate must be a whole number .*, got 30\.0"),
         ("a_file", (1280, 720), 60, "is not a folder"),
         ("a_folder.mp4", (1280, 720), 60, "is a folder"),
         ("photos", (1280, 720), 60, r"other files \(me\.jpg\)"),
@@ -91,7 +91,7 @@ def test_a_folder_that_holds_anything_but_frames_is_refused(tmp_path: Path, name
 def test_a_link_to_a_folder_of_frames_is_refused_before_anything_is_rendered(
     tmp_path: Path,
 ) -> None:
-    """The finished folder takes the place of the older one by renaming, which a link does not allow."""
+    """Renaming replaces the older folder by the finished one; a link does not allow that."""
     (tmp_path / "older").mkdir()
     (tmp_path / "frames").symlink_to(tmp_path / "older")
     with pytest.raises(VideoError, match=r"frames: it is a link; name the folder .*older"):

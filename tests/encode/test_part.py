@@ -36,7 +36,9 @@ for ending in {ENDINGS!r}:
     path = Path(sys.argv[1]) / f"clip{{ending}}"
     if path.exists() and not path.with_name(path.name + ".part").exists():
         continue
-    with open_writer(path, width={SIZE[0]}, height={SIZE[1]}, fps={FPS}, settings={SETTINGS!r}, resume=True) as writer:
+    with open_writer(
+        path, width={SIZE[0]}, height={SIZE[1]}, fps={FPS}, settings={SETTINGS!r}, resume=True
+    ) as writer:
         for number in range(writer.frames, {FRAMES}):
             frame = np.full(({SIZE[1]}, {SIZE[0]}, 3), 60, np.uint8)
             frame[10:30, number % 40 : number % 40 + 20] = (230, 180, number)

@@ -1,4 +1,4 @@
-"""Videos: what goes in comes out, and what cannot be written is refused before anything is rendered."""
+"""Videos: frames come out as they went in; what cannot be written is refused early."""
 
 import dataclasses
 import threading
@@ -131,7 +131,10 @@ def test_the_same_frames_give_the_same_bytes(tmp_path, ending):
 def test_an_error_while_rendering_leaves_nothing_but_the_video_that_was_there(
     tmp_path, ending, settings
 ):
-    """What would fail again leaves nothing to resume; without settings nobody could tell what the rest belongs to."""
+    """A job that would fail again leaves nothing to resume.
+
+    Without settings nobody knows the job that a part belongs to.
+    """
     older = [tmp_path / "clip.mp4"] if ending == ".mp4" else []
     for path in older:
         path.write_bytes(b"yesterday's")

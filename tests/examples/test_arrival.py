@@ -1,4 +1,4 @@
-"""Times of arrival: against exact geodesics, and the same for the same object however it lies, is scaled or meshed.
+"""Arrival times against exact geodesics, independent of pose, scale and mesh.
 
 The bump's wave on the plane is that of another way to compute it: Poisson's integral of the initial
 value problem.
@@ -188,7 +188,10 @@ SLANTS = np.linspace(0, np.pi / 2, 2001)
 
 
 def potential(r: float, times: np.ndarray) -> np.ndarray:
-    """Integral over s < t of s mean(s) / sqrt(t^2 - s^2), with s = t sin(a); mean over the circle of radius s."""
+    """Integral over s < t of s mean(s) / sqrt(t^2 - s^2), with s = t sin(a).
+
+    mean(s) is the mean over the circle of radius s.
+    """
     s = times[:, None] * np.sin(SLANTS)
     return times * simpson(np.sin(SLANTS) * np.exp(-((r - s) ** 2) / 2) * i0e(r * s), x=SLANTS)
 

@@ -1,4 +1,4 @@
-"""Every file of examples is imported, which does nothing else; they run, in small where they take long."""
+"""Examples: every file can be imported and runs, in a smaller version if it is long."""
 
 import importlib.util
 import json
@@ -47,7 +47,7 @@ without_warnings = pytest.mark.filterwarnings("error::ripple_sim.errors.RippleWa
 
 @pytest.fixture
 def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
-    """An empty folder to stand in; modules that files import from beside themselves are forgotten afterwards."""
+    """An empty working folder; modules imported from an example's folder are removed again."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["example"])
     before = set(sys.modules)

@@ -1,4 +1,4 @@
-"""The tables in the documentation are those of a whole run of their benchmarks, by today's operator."""
+"""The tables in the documentation come from complete runs with today's operator."""
 
 from pathlib import Path
 

@@ -14,14 +14,19 @@ MJCF = """<mujoco><option timestep="0.001"/>
 <worldbody><light pos="1 0 2" dir="-1 0 -2" type="spot" specular=".1 .1 .1"/>
 <camera name="side" pos="0 -2 0.5" xyaxes="1 0 0 0 0.2 1" fovy="40"/>
 <geom name="floor" type="plane" size="2 2 .1" pos="0 0 -0.4" material="tiles"/>
-<body name="nest" pos="0.1 0 0" euler="0 0 30"><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/></body>
-<body name="stone" pos="0.15 0 0.245"><freejoint/><geom name="stone" size="0.05" rgba="1 0 0 1"/></body>
+<body name="nest" pos="0.1 0 0" euler="0 0 30">
+<geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/></body>
+<body name="stone" pos="0.15 0 0.245"><freejoint/><geom name="stone" size="0.05" rgba="1 0 0 1"/>
+</body>
 </worldbody></mujoco>"""
 
 SOFT = """<mujoco><option timestep="0.002" solver="CG"/><worldbody>
-<body name="nest" pos="0.1 0 0.6" euler="0 0 30"><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/></body>
-<flexcomp name="jelly" type="grid" count="3 3 3" spacing=".1 .1 .1" pos="1 0 .2" dim="3" radius=".005" dof="trilinear"
-  mass="2"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3" damping=".02"/></flexcomp>
+<body name="nest" pos="0.1 0 0.6" euler="0 0 30">
+<geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/></body>
+<flexcomp name="jelly" type="grid" count="3 3 3" spacing=".1 .1 .1" pos="1 0 .2" dim="3"
+  radius=".005" dof="trilinear"
+  mass="2"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3" damping=".02"/>
+  </flexcomp>
 <geom type="plane" size="3 3 .1" pos="0 0 .09"/></worldbody></mujoco>"""
 
 TOML = """model = "scene.xml"

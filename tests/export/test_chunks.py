@@ -120,7 +120,7 @@ def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) 
     [
         ("run.usdz", {}, r"chunks of \.usdc and \.usda files alone"),
         ("run.html", {}, r"chunks of \.usdc and \.usda files alone"),
-        ("run.usdc", {"chunk": 0}, "chunk is 0; valid is a whole number, 1 or greater"),
+        ("run.usdc", {"chunk": 0}, "chunk must be a whole number, 1 or greater, got 0"),
         ("run.usdc", {"chunk": None, "resume": True}, "add --chunk"),
     ],
 )

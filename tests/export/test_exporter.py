@@ -98,7 +98,8 @@ def test_a_file_without_frames_is_refused(ripples: Ripples, tmp_path: Path) -> N
 def test_a_page_says_once_that_it_shows_an_orthographic_camera_in_perspective(
     tmp_path: Path,
 ) -> None:
-    xml = """<mujoco><worldbody><geom name="ball" size=".3"/><camera name="flat" pos="0 -2 0" xyaxes="1 0 0 0 0 1"
+    xml = """<mujoco><worldbody><geom name="ball" size=".3"/>
+    <camera name="flat" pos="0 -2 0" xyaxes="1 0 0 0 0 1"
         projection="orthographic" fovy="1"/></worldbody></mujoco>"""
     model, data = posed(xml)
     ripples = Ripples(

@@ -7,7 +7,8 @@ from mujoco_models import posed
 from ripple_sim import Material, RippleError, RippleRenderer, Ripples
 from ripple_sim.coupling.watched import WatchedArray
 
-XML = """<mujoco><asset><texture name="t" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".8 .8 .8" width="64"
+XML = """<mujoco><asset>
+<texture name="t" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".8 .8 .8" width="64"
 height="64"/><texture name="sides" type="cube" builtin="flat" rgb1=".9 .2 .2" width="8" height="8"/>
 <material name="floor" texture="t" texrepeat="4 4"/><material name="paint" rgba="1 .5 .2 1"/>
 <material name="sides" texture="sides"/><mesh name="tet" vertex="0 0 0 .5 0 0 0 .5 0 0 0 .5"/>
@@ -18,7 +19,8 @@ height="64"/><texture name="sides" type="cube" builtin="flat" rgb1=".9 .2 .2" wi
 <geom name="other" type="box" size=".4 .4 .4" pos="1 0 .5" material="paint"/>
 <geom name="dice" type="box" size=".3 .3 .3" pos="0 -1 .3" material="sides"/>
 <geom name="rock" type="mesh" mesh="tet" pos="1.5 -1.5 .3" rgba=".2 .7 .2 1"/>
-<geom name="hills" type="hfield" hfield="hills" pos="-1.5 -1.5 .1" rgba=".3 .6 .9 1"/></worldbody></mujoco>"""
+<geom name="hills" type="hfield" hfield="hills" pos="-1.5 -1.5 .1" rgba=".3 .6 .9 1"/></worldbody>
+</mujoco>"""
 SIZE = 96, 128
 
 
@@ -84,9 +86,20 @@ CHANGES = [
 
 
 WRITTEN = (
-    "geom_rgba", "geom_size", "geom_matid", "mat_rgba", "mat_emission", "mat_specular", "mat_reflectance",
-    "mat_texrepeat", "mat_texid", "tex_data", "hfield_data", "mesh_vert", "light_diffuse",
-)  # fmt: skip
+    "geom_rgba",
+    "geom_size",
+    "geom_matid",
+    "mat_rgba",
+    "mat_emission",
+    "mat_specular",
+    "mat_reflectance",
+    "mat_texrepeat",
+    "mat_texid",
+    "tex_data",
+    "hfield_data",
+    "mesh_vert",
+    "light_diffuse",
+)
 
 
 def images_of(renderer, data):
@@ -163,7 +176,7 @@ def test_an_upload_in_mujocos_words_is_taken_and_others_are_refused():
         renderer.upload_mesh(0)
         images_of(renderer, data)
         for upload in (renderer.upload_texture, renderer.upload_mesh, renderer.upload_hfield):
-            with pytest.raises(RippleError, match=r"is 2; the model has [12] of them"):
+            with pytest.raises(RippleError, match=r"must be an id below [12], from 0, got 2"):
                 upload(2)
 
 

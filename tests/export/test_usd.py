@@ -120,8 +120,10 @@ def test_camera_has_the_angle_of_view_the_lens_and_the_shutter(run: Any) -> None
 
 
 CAMERAS = """<mujoco><worldbody><geom name="ball" size=".3"/>
-  <camera name="orthographic" pos="0 -2 .3" xyaxes="1 0 0 0 .2 1" projection="orthographic" fovy="1.5"/>
-  <camera name="off centre" pos="0 -2 .3" xyaxes="1 0 0 0 .2 1" resolution="320 240" sensorsize="8e-3 6e-3"
+  <camera name="orthographic" pos="0 -2 .3" xyaxes="1 0 0 0 .2 1" projection="orthographic"
+    fovy="1.5"/>
+  <camera name="off centre" pos="0 -2 .3" xyaxes="1 0 0 0 .2 1" resolution="320 240"
+    sensorsize="8e-3 6e-3"
     focal="5e-3 7e-3" principal="1e-3 .5e-3"/></worldbody></mujoco>"""
 
 

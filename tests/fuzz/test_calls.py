@@ -1,4 +1,4 @@
-"""Calls and command lines with anything in them work, or raise our error, or end with status 0 or 2."""
+"""Calls and commands with any arguments work, raise our error, or exit with 0 or 2."""
 
 from collections.abc import Callable
 from typing import Any

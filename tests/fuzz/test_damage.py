@@ -1,4 +1,4 @@
-"""Damaged caches are made anew; damaged folders of ours are mended, or refused in one line; others' files stay."""
+"""Damaged caches are rebuilt; damaged output is mended or refused; other files stay."""
 
 import contextlib
 import dataclasses

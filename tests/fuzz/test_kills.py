@@ -1,4 +1,4 @@
-"""Killed at any moment, a job run again ends as if nothing had happened, and nobody else's file is touched."""
+"""A job that was killed at any moment ends as if unbroken when it runs again."""
 
 import functools
 import multiprocessing
@@ -40,7 +40,7 @@ LOADED = [
 
 
 def finish(home: Path, words: str, kill: int = 0, after: float = 300) -> tuple[int, float]:
-    """Run a command, to its end or until it is killed after some seconds; return its status, and how long it ran."""
+    """Run a command to its end or kill it after some seconds; return status and time."""
     (home / "out").mkdir(exist_ok=True)
     begun = CONTEXT.Event()
     process = CONTEXT.Process(target=begin_command, args=(home, words, begun))

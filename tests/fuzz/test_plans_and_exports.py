@@ -1,4 +1,4 @@
-"""Plans of batches and options of exports with anything in them make what they say, or are refused in one line."""
+"""Plans and export options of any content work or are refused in one line."""
 
 import tomllib
 from collections.abc import Iterator
@@ -118,8 +118,8 @@ def test_a_plan_with_any_bytes_anywhere(changes: list) -> None:
 
 
 CHOICES = {
-    "-o": ["run.usda", "run.usdc", "run.usdz", "run.html", "run.zarr", "run.csv", "run.parquet", "a/b.csv", ".csv", "x",
-           "run.csv/y.csv", "thesis", "thesis/chapter.tex", "thesis.csv"],
+    "-o": ["run.usda", "run.usdc", "run.usdz", "run.html", "run.zarr", "run.csv", "run.parquet",
+           "a/b.csv", ".csv", "x", "run.csv/y.csv", "thesis", "thesis/chapter.tex", "thesis.csv"],
     "--fps": [20, 100, 0, 1001, "x"],
     "--chunk": [1, 2, 3, 100, 0, -1, "x"],
     "--duration": [0.05, 0.1, 0.001, 0, -1, "nan", "inf", 1e300],

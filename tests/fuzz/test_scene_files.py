@@ -1,4 +1,4 @@
-"""Scene files, models and meshes of any content load, or raise our error; a mesh is finite and has triangles."""
+"""Scene files, models and meshes of any content load, or raise our error."""
 
 from pathlib import Path
 from typing import Any

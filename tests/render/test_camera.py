@@ -1,4 +1,4 @@
-"""Cameras agree with MuJoCo's, points land where they shall in the frame; bounding balls and boxes; the sRGB curve."""
+"""Cameras agree with MuJoCo's and with projection by hand; bounds; the sRGB curve."""
 
 import dataclasses
 
@@ -13,7 +13,8 @@ from ripple_sim.solver import RippleError
 
 MJCF = """<mujoco><worldbody>
 <geom size="1"/><camera name="side" pos="0 -5 1" xyaxes="1 0 0 0 .2 1"/>
-<body name="moving" pos="1 2 3"><freejoint/><geom size=".1" pos=".2 0 0"/><camera pos="0 -2 0" fovy="30"/></body>
+<body name="moving" pos="1 2 3"><freejoint/><geom size=".1" pos=".2 0 0"/>
+<camera pos="0 -2 0" fovy="30"/></body>
 </worldbody><visual><global fovy="35" azimuth="20" elevation="-10"/></visual></mujoco>"""
 FREE = {"lookat": (0.3, -0.2, 0.1), "distance": 2.5, "azimuth": 37.0, "elevation": -28.0}
 
@@ -50,9 +51,7 @@ def default_camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
     ],
     ids=["-1", "id", "name", "free", "free with a flag", "ours", "tracking", "fixed"],
 )
-def test_cameras_of_all_kinds_and_what_mujocos_renderer_takes_for_one_stand_look_and_open_as_mujocos(
-    given, theirs
-):
+def test_cameras_of_all_kinds_have_the_pose_and_angle_of_mujocos(given, theirs):
     model = mujoco.MjModel.from_xml_string(MJCF)
     data = mujoco.MjData(model)
     data.qpos[:] = [0.5, 0.4, 2.0, 0.8, 0.0, 0.6, 0.0]
@@ -78,9 +77,9 @@ def test_cameras_of_all_kinds_and_what_mujocos_renderer_takes_for_one_stand_look
         (2, r"no camera 2; it has: 'side' \(id 0\), '' \(id 1\)"),
         (-2, "no camera -2"),
         ("sid", "'sid'.*'side'"),
-        ((0.0, 1.0, 2.0), "camera is tuple; valid are a Camera"),
-        (mujoco_camera("USER"), "type is 3; valid are mjCAMERA_FREE"),
-        (mujoco_camera("TRACKING"), "trackbodyid is -1; valid are 0 to 1"),
+        ((0.0, 1.0, 2.0), "camera must be a Camera, .*, got tuple"),
+        (mujoco_camera("USER"), "type must be mjCAMERA_FREE .*, got 3"),
+        (mujoco_camera("TRACKING"), "trackbodyid must be a body of the model, 0 to 1, got -1"),
         (mujoco_camera("FIXED"), "no camera -1"),
     ],
 )
@@ -231,9 +230,7 @@ def test_where_only_perspective_can_be_shown_it_has_the_same_height_in_focus_wit
     )
 
 
-def test_the_whole_frame_for_a_ball_about_the_eye_or_an_infinite_one_and_nothing_for_one_behind() -> (
-    None
-):
+def test_a_ball_about_the_eye_has_the_whole_frame_and_a_ball_behind_the_eye_has_none() -> None:
     camera = pose(4)
     behind = camera.eye + 2.0 * camera.rotation[:, 2]
     centres = np.stack([camera.eye, camera.eye + camera.rotation[:, 0], behind])
@@ -274,9 +271,11 @@ def test_the_orthographic_box_is_clip_space(half_width, depth):
 SENSED = """<mujoco><statistic center="0 0 0" extent="3"/><worldbody><geom size=".1"/>
 <camera name="plain" pos="0 -5 1" xyaxes="1 0 0 0 .2 1" fovy="30"/>
 <camera name="orthographic" pos="1 -5 1" xyaxes="1 0 0 0 .2 1" projection="orthographic" fovy="3"/>
-<camera name="off centre" pos="0 -5 1" xyaxes="1 .1 0 0 .2 1" resolution="200 120" sensorsize="8e-3 4.8e-3"
+<camera name="off centre" pos="0 -5 1" xyaxes="1 .1 0 0 .2 1" resolution="200 120"
+  sensorsize="8e-3 4.8e-3"
   focal="6e-3 6e-3" principal="1e-3 .5e-3"/>
-<camera name="two focal lengths" pos="0 -5 1" xyaxes="1 0 0 0 .2 1" resolution="200 120" sensorsize="8e-3 4.8e-3"
+<camera name="two focal lengths" pos="0 -5 1" xyaxes="1 0 0 0 .2 1" resolution="200 120"
+  sensorsize="8e-3 4.8e-3"
   focal="3e-3 6e-3"/></worldbody></mujoco>"""
 
 
@@ -369,10 +368,12 @@ def test_a_camera_that_rides_along_stays_about_what_carries_it():
 
 
 def test_a_camera_on_a_moving_link_is_about_its_robot_and_one_that_turns_to_a_body_about_that():
-    model = mujoco.MjModel.from_xml_string("""<mujoco><statistic center="9 9 9" extent="1"/><worldbody>
+    model = mujoco.MjModel.from_xml_string("""<mujoco><statistic center="9 9 9" extent="1"/>
+    <worldbody>
         <body name="base" pos="3 0 0"><geom size=".2"/><body pos="0 0 1"><joint/><geom size=".2"/>
         <camera name="wrist" pos="0 0 1"/></body></body>
-        <camera name="aimed" mode="targetbody" target="base"/><camera name="still"/></worldbody></mujoco>""")
+        <camera name="aimed" mode="targetbody" target="base"/><camera name="still"/></worldbody>
+        </mujoco>""")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     away = {

@@ -1,4 +1,4 @@
-"""Any frame is as good as the first, and frames that come back late are the same, bit for bit, in their order."""
+"""Frames that are read back late are the same, bit for bit, and in order."""
 
 import contextlib
 import dataclasses
@@ -50,7 +50,7 @@ def renderer_of(gl, name: str) -> tuple[Renderer, mujoco.MjData]:
 
 
 def drawn(renderer: Renderer, data: mujoco.MjData) -> list[np.ndarray]:
-    """A frame, two through other points of the lens, as frames with depth of field are made, and what pixels show."""
+    """A frame, two frames through other points of the lens, and what their pixels show."""
     lenses = (0.0, 0.0), (0.1, 0.0), (-0.05, 0.08)
     eyes = [dataclasses.replace(FRONT.pose(), lens=lens, focal_distance=3.0) for lens in lenses]
     frames = [renderer.render(data, {}, eye, number) for number, eye in enumerate(eyes)]
@@ -97,7 +97,7 @@ def test_any_frame_is_as_the_first_whatever_was_in_memory_or_in_the_last(
 
 
 def fill(ctx: moderngl.Context, made: Any, depth: float, empty: bool) -> None:
-    """Fill what was made without contents with what cannot be missed where it is read: NaN where there is one."""
+    """Fill buffers made without contents with NaN, so that a read shows."""
     if isinstance(made, moderngl.Buffer):
         if empty:
             made.write(b"\xff" * made.size)

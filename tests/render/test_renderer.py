@@ -1,4 +1,4 @@
-"""Frames against geometry known in closed form, and against a brute-force reference, drawn large and shrunk."""
+"""Frames against closed-form geometry and a brute-force reference, drawn large and shrunk."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def make(gl, xml=LONE_BALL, surface=None, size=SIZE, **options):
 
 
 def silhouette(gl, surface, height_map) -> np.ndarray:
-    """Pixels that a target covers: those that differ from a frame from which the target is far away."""
+    """Pixels that a target covers: a frame without the target differs there."""
     renderer, data, target = make(gl, surface=surface)
     frame = renderer.render(data, {target: height_map}, FRONT).astype(int)
     data.geom_xpos[target] = [0.0, -50.0, 0.0]
@@ -78,7 +78,7 @@ def test_a_slope_that_faces_the_light_is_brighter(gl):
     "direction", [(1, 1, 0), (1, 0, 1), (0, 1, -1), (1, 1, 1), (-1, 1, -1), (-1, -1, 1)], ids=str
 )
 def test_ripples_run_on_across_cube_edges_and_corners(gl, direction):
-    """Close up, neighbouring pixels differ no more at an edge or a corner of the cube than in a face's middle."""
+    """Neighbouring pixels differ no more at an edge or corner of the cube than elsewhere."""
     slope = np.array([0.11, -0.07, 0.05])
     height_map = linear_height_map(slope)
     renderer, data, target = make(gl, size=(160, 160), samples=0)
@@ -166,7 +166,7 @@ def shrunk(picture, factor):
 
 
 def similarity(a, b):
-    """Mean structural similarity of two pictures (Wang et al. 2004), by channels, Gaussian window of 1.5 pixels."""
+    """Mean structural similarity of two pictures (Wang et al. 2004), window of 1.5 pixels."""
 
     def blur(x):
         return gaussian_filter(x, (1.5, 1.5, 0.0), truncate=3.5)

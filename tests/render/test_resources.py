@@ -83,8 +83,10 @@ def test_a_renderer_that_is_collected_while_another_draws_changes_no_pixel(gl):
                 np.testing.assert_array_equal(frame_while(end_another, moment), expected)
 
 
-SHINY = """<mujoco><asset><material name="shiny" reflectance=".4" rgba=".8 .8 .8 1"/></asset><worldbody>
-<geom type="plane" size="0 0 .1" material="shiny"/><geom type="sphere" size=".3" pos="0 0 .8" rgba=".8 .2 .2 1"/>
+SHINY = """<mujoco><asset><material name="shiny" reflectance=".4" rgba=".8 .8 .8 1"/></asset>
+<worldbody>
+<geom type="plane" size="0 0 .1" material="shiny"/>
+<geom type="sphere" size=".3" pos="0 0 .8" rgba=".8 .2 .2 1"/>
 <geom type="sphere" size=".2" pos=".6 0 .8" rgba=".2 .2 .9 .5"/></worldbody></mujoco>"""
 
 
@@ -95,7 +97,7 @@ SHINY = """<mujoco><asset><material name="shiny" reflectance=".4" rgba=".8 .8 .8
 def test_after_an_interrupted_frame_the_next_is_right_also_in_other_renderers(
     gl, monkeypatch, owner, name, moments
 ):
-    """As after Ctrl-C in a notebook: masks, scissors or the reflection's winding are set for a while."""
+    """As after Ctrl-C in a notebook: masks, scissors or winding are still set."""
     model = mujoco.MjModel.from_xml_string(SHINY)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -198,7 +200,7 @@ void main() {
 
 
 def sampled(resources, texture, places, kind="2D") -> np.ndarray:
-    """Colours [k, 3] at texture coordinates or directions, with the mipmap level as their fourth number."""
+    """Colours [k, 3] at texture coordinates or directions; the last number is the mipmap level."""
     source = SAMPLE.replace("SAMPLER", f"sampler{kind}").replace(
         "COORDINATES", "xy" if kind == "2D" else "xyz"
     )

@@ -23,7 +23,7 @@ def directions() -> np.ndarray:
 
 
 def test_octahedral_codes_fill_the_unit_square_and_directions_come_back(gl):
-    """From sixteen bits, too: a step of the code turns a normal by less than a hundredth of a degree."""
+    """A step of a 16-bit code turns a normal by less than a hundredth of a degree."""
     given = directions()
     encode = "octahedral_encode(x.xyz)"
     code = evaluated(gl, FILE, f"vec4({encode}, 0.0, 0.0)", given)[:, :2]

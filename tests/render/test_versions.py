@@ -1,4 +1,4 @@
-"""OpenGL 4.1, where macOS ends: frames are those of later versions, without anything that these have added."""
+"""OpenGL 4.1, the last of macOS, gives the frames of later versions."""
 
 import importlib
 import os
@@ -23,8 +23,10 @@ from ripple_sim.solver.gl import GLContext, shared_context
 
 MODEL = """<mujoco>
   <asset>
-    <texture name="sky" type="{sky}" builtin="gradient" rgb1=".3 .5 .7" rgb2="0 0 0" width="16" height="96"/>
-    <texture name="dice" type="cube" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="32" height="192"/>
+    <texture name="sky" type="{sky}" builtin="gradient" rgb1=".3 .5 .7" rgb2="0 0 0" width="16"
+      height="96"/>
+    <texture name="dice" type="cube" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="32"
+      height="192"/>
     <material name="dice" texture="dice"/>
     <material name="floor" reflectance="{reflectance}"/>
   </asset>
@@ -38,7 +40,7 @@ MODEL = """<mujoco>
 
 
 def drawn() -> Iterator[NDArray]:
-    """Frames and surface images of a rippling ball: on a smooth floor, solid or not, and on one that reflects."""
+    """Frames and surface images of a rippling ball on three kinds of floor."""
     atlas = sphere_atlas(0.5, 24)
     heights = 0.02 * np.sin(20 * atlas.positions[..., 0] + 9 * atlas.positions[..., 2])
     height_map = HeightMap(atlas.texels)(heights.astype(np.float32))
@@ -79,7 +81,7 @@ class Without:
 
 
 def draw_in_old_opengl(path: str) -> None:
-    """Write what is drawn without functions later than OpenGL 4.1, in a process whose shaders are no later either."""
+    """Draw in a process with shaders and functions of OpenGL 4.1 alone."""
     later = [
         importlib.import_module(f"OpenGL.raw.GL.VERSION.GL_4_{minor}") for minor in range(2, 7)
     ]

@@ -37,7 +37,7 @@ def vertices(scene: Scene) -> np.ndarray:
 
 
 def cone(folder, name: str, turn: list | None = None) -> str:
-    """A cone 300 units high and 200 wide, off the origin, in a file; its tip is at its greatest z before a turn."""
+    """A cone 300 units high and 200 wide, off the origin; its tip is its greatest z."""
     solid = trimesh.creation.cone(radius=100, height=300, sections=16)
     solid.apply_translation([500, -700, 40])
     if turn is not None:
@@ -82,9 +82,9 @@ def test_an_edit_changes_the_model_and_mujocos_refusal_of_it_is_named(tmp_path) 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"bodies": -1}, "number of bodies is -1; valid is 0 to 100"),
-        ({"bodies": 101}, "number of bodies is 101"),
-        ({"up": "x"}, "up axis is 'x'; valid are 'y' and 'z'"),
+        ({"bodies": -1}, "number of bodies must be 0 to 100, got -1"),
+        ({"bodies": 101}, "number of bodies must be .*, got 101"),
+        ({"up": "x"}, "up axis must be 'y' or 'z', got 'x'"),
     ],
 )
 def test_invalid_options_are_named(tmp_path, options: dict, message: str) -> None:
@@ -161,7 +161,7 @@ def test_a_mesh_with_two_images_gets_none_and_warns(tmp_path):
     half_and_half(tmp_path / "b.png")
     (tmp_path / "p.mtl").write_text("newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png\n")
     mesh = textured_obj(tmp_path / "p.obj", "mtllib p.mtl", "usemtl a\nusemtl b")
-    with pytest.warns(RippleWarning, match="2 images.*--texture"):
+    with pytest.warns(RippleWarning, match=r"2 images.*--texture"):
         assert mesh_image(mesh) is None
 
 

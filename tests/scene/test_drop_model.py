@@ -11,7 +11,7 @@ from ripple_sim.scene import BODY_SHAPES, DropEntry, RandomEntry, drop_model, ra
 
 
 def table() -> tuple[np.ndarray, np.ndarray]:
-    """A column of 0.5 m under a wide plate at 0.9 to 1 m: the only surface open to the sky is the plate's top."""
+    """A column of 0.5 m under a wide plate at 0.9 to 1 m: only the plate's top is open."""
     profile = np.array([[0, 0], [0.1, 0], [0.1, 0.9], [0.5, 0.9], [0.5, 1.0], [0, 1.0]])
     solid = trimesh.creation.revolve(profile, sections=24)
     return np.asarray(solid.vertices), np.asarray(solid.faces)
@@ -93,8 +93,10 @@ def test_bodies_of_every_shape_have_about_the_mass_and_size_of_a_ball(shape: str
 
 MJCF = """<mujoco><worldbody><geom name="table" type="box" size="1 1 0.1"/>
 <body name="post" pos="0 0 1"><joint type="slide"/><geom name="post" size="0.1"/></body>
-<body name="stone" pos="1 0 3" euler="10 0 0"><freejoint/><geom name="stone" size="0.1" density="500"/></body>
-<body name="brick" pos="2 0 3"><freejoint/><geom name="brick" type="box" size="0.1 0.2 0.3" mass="2"/></body>
+<body name="stone" pos="1 0 3" euler="10 0 0"><freejoint/>
+<geom name="stone" size="0.1" density="500"/></body>
+<body name="brick" pos="2 0 3"><freejoint/>
+<geom name="brick" type="box" size="0.1 0.2 0.3" mass="2"/></body>
 </worldbody></mujoco>"""
 
 
@@ -190,17 +192,17 @@ def test_only_named_bodies_vary() -> None:
         ),
         (
             {"size": (0.0, 1.0)},
-            r"size is \[0.0, 1.0\]; valid are two positive factors, the lower one first",
+            r"size must be two positive factors, the lower one first, got \[0.0, 1.0\]",
         ),
-        ({"mass": (2.0, 1.0)}, r"mass is \[2.0, 1.0\]"),
-        ({"mass": (1.0, np.inf)}, r"mass is \[1.0, inf\]"),
-        ({"size": (np.nan, 1.0)}, r"size is \[nan, 1.0\]"),
-        ({"position": -0.1}, "position is -0.1 m; valid is 0 or greater"),
-        ({"position": np.nan}, "position is nan"),
-        ({"seed": -1}, "seed is -1; valid is 0 or greater"),
+        ({"mass": (2.0, 1.0)}, r"mass must be .*, got \[2.0, 1.0\]"),
+        ({"mass": (1.0, np.inf)}, r"mass must be .*, got \[1.0, inf\]"),
+        ({"size": (np.nan, 1.0)}, r"size must be .*, got \[nan, 1.0\]"),
+        ({"position": -0.1}, "position must be 0 or greater, got -0.1 m"),
+        ({"position": np.nan}, "position must be .*, got nan"),
+        ({"seed": -1}, "seed must be 0 or greater, got -1"),
         (
             {"shapes": ["box", "cone"]},
-            "shape 'cone'; valid are sphere, box, capsule, ellipsoid, cylinder",
+            "shapes must be of sphere, box, capsule, ellipsoid, cylinder, got 'cone'",
         ),
     ],
 )

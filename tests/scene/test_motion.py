@@ -11,11 +11,13 @@ from ripple_sim.errors import SceneError
 from ripple_sim.scene import DropEntry, Events, PlaceEntry, Script, ThrowEntry, load_scene
 from ripple_sim.simulation import Simulation
 
-MJCF = """<mujoco><option timestep="0.002"/><worldbody><geom name="ground" type="plane" size="9 9 1"/>
+MJCF = """<mujoco><option timestep="0.002"/><worldbody>
+<geom name="ground" type="plane" size="9 9 1"/>
 <body name="post" pos="5 0 0"><joint type="hinge" axis="0 0 1"/><geom size="0.1"/></body>
 <body name="wall" pos="6 0 0"><geom size="0.1"/></body>
 <body name="stone" pos="0 0 3" quat="0.6 0 0.8 0"><freejoint/><geom size="0.1"/></body>
-<body name="brick" pos="2 0 3"><freejoint/><geom type="box" size="0.1 0.2 0.1"/></body></worldbody></mujoco>"""
+<body name="brick" pos="2 0 3"><freejoint/><geom type="box" size="0.1 0.2 0.1"/></body></worldbody>
+</mujoco>"""
 
 
 @pytest.fixture(scope="module")
@@ -125,20 +127,20 @@ def test_a_time_within_round_off_of_a_step_belongs_to_it(model) -> None:
         ),
         (
             ThrowEntry("post", 0.0, (0, 0, 1)),
-            r"\[\[throw\]\] .* 'post', which has no <freejoint/>; valid are free",
+            r"\[\[throw\]\] .* 'post', which has no <freejoint/>; name a free body",
         ),
         (DropEntry("wall", 0.0), "'wall', which has no <freejoint/>; only free bodies can drop"),
-        (PlaceEntry("stone", np.nan, (0, 0, 0)), "time nan s; valid is 0 or greater"),
-        (PlaceEntry("stone", np.inf, (0, 0, 0)), "time inf s; valid is 0 or greater"),
+        (PlaceEntry("stone", np.nan, (0, 0, 0)), "time must be 0 or greater, got nan s"),
+        (PlaceEntry("stone", np.inf, (0, 0, 0)), "time must be 0 or greater, got inf s"),
         (
             PlaceEntry("stone", -0.1, (0, 0, 0)),
-            r"\[\[place\]\] of 'stone' has time -0.1 s; valid is 0 or greater",
+            r"\[\[place\]\] of 'stone': time must be 0 or greater, got -0.1 s",
         ),
         (
             DropEntry("stone", 0.0, orientation=(0, 0, 0, 0)),
-            "orientation .*; valid is w x y z, not 0",
+            "orientation must be w x y z, not 0, got",
         ),
-        (DropEntry("stone", 0.0, orientation=(np.nan, 0, 0, 1)), "valid is w x y z, not 0"),
+        (DropEntry("stone", 0.0, orientation=(np.nan, 0, 0, 1)), "must be w x y z, not 0"),
     ],
 )
 def test_entries_that_cannot_be_carried_out_are_refused_at_once(
@@ -153,7 +155,8 @@ SCENE = """<mujoco><compiler angle="degree"/><option timestep="0.002" gravity="0
 <geom name="egg" type="ellipsoid" size="0.3 0.2 0.2" pos="0.1 0 0" euler="0 90 0"/></body>
 <body name="stone" pos="0 0 3"><freejoint/><geom name="stone" size="0.05" mass="0.2"/></body>
 <body name="brick" pos="2 0 3"><freejoint/><geom name="brick" type="box" size="0.1 0.1 0.1"/></body>
-<body name="post" pos="0 3 0"><joint name="post" type="slide" axis="0 0 1"/><geom name="post" size="0.05"/></body>
+<body name="post" pos="0 3 0"><joint name="post" type="slide" axis="0 0 1"/>
+<geom name="post" size="0.05"/></body>
 </worldbody>
 <actuator><position name="lift" joint="post" kp="100" kv="20"/></actuator></mujoco>"""
 TOML = """model = "scene.xml"

@@ -74,7 +74,7 @@ def pressing(model, data, target):
 
 @pytest.fixture(scope="module")
 def duck_rain():
-    """Five seconds of the duck scene: time and speed of every toy's first hit, and how often one was inside."""
+    """Five seconds of the duck: time and speed of each toy's first hit; geoms inside."""
     model, data = load("duck")
     V, F = shapes.duck()
     target = model.geom("duck").id

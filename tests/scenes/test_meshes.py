@@ -1,4 +1,4 @@
-"""The shipped meshes are what examples/scene_meshes makes, and have the shapes that their scenes need."""
+"""The shipped meshes are those of examples/scene_meshes, and fit their scenes."""
 
 import drum
 import head

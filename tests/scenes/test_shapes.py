@@ -1,4 +1,4 @@
-"""The shipped meshes: closed, of genus 0, outward, even, and the same whenever they are made again."""
+"""The shipped meshes: closed, genus 0, outward, even, and reproducible."""
 
 import functools
 

@@ -15,7 +15,7 @@ from ripple_sim.solver.layouts.sphere_map import certify, progressive_sphere_map
 
 @pytest.fixture(scope="module")
 def meshes() -> list[Mesh]:
-    """The geoms among the shipped scenes' targets that are closed, one part and of genus 0, and no spheres."""
+    """The shipped targets that are closed, one part and of genus 0, and no spheres."""
     found = []
     for name in shipped_scenes():
         scene = load_scene(name)

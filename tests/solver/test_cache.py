@@ -73,7 +73,7 @@ def test_a_limit_that_is_no_size_is_refused_before_anything_is_made(
 ) -> None:
     monkeypatch.setenv(cache.LIMIT, limit)
     with pytest.raises(
-        RippleError, match=f"{cache.LIMIT} is '{limit}'; valid is a number of megabytes"
+        RippleError, match=f"{cache.LIMIT} must be a number of megabytes.*, got '{limit}'"
     ):
         build_atlas(ball_mesh, 8)
 
@@ -91,7 +91,7 @@ def test_a_file_that_another_process_removes_is_no_error(monkeypatch) -> None:
 def test_without_a_home_results_are_kept_in_a_private_folder(
     home: str | None, tmp_path: Path, monkeypatch
 ) -> None:
-    """A service, or a container with a foreign user: neither HOME nor an entry in passwd, or one that is not there."""
+    """A service or container whose HOME and passwd entry are missing or invalid."""
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr(

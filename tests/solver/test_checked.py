@@ -1,4 +1,4 @@
-"""Senseless arguments of public functions raise our own error: it names the argument, the value and what is valid."""
+"""Bad arguments raise our error with the argument, its value and what is expected."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -31,54 +31,60 @@ RIPPLES = Ripples(MODEL, {"g": Material()}, resolution=4, backend="cpu")
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "waves of nothing": (
         lambda: Material(wavelengths=None),
-        "wavelengths is None m; valid are two numbers",
+        "wavelengths must be two numbers.*, got None m",
     ),
     "longest first": (
         lambda: Material(wavelengths=(2, 1)),
-        r"wavelengths is \(2, 1\) m; valid are two numbers",
+        r"wavelengths must be two numbers.*, got \(2, 1\) m",
     ),
     "preset of a list": (
         lambda: Material.preset([]),
-        r"preset \[\] does not exist; valid are gelatine-3, ",
+        r"preset must be one of gelatine-3, .*, got \[\]",
     ),
     "nothing inside": (
         lambda: thickness_map(ATLAS, None),
-        "inside is None; valid is a Mesh, a Volume, or several",
+        "inside must be a Mesh, a Volume, or several.*, got None",
     ),
-    "inside nothing": (lambda: thickness_map(None, ATLAS.mesh), "atlas is None; valid is an Atlas"),
+    "inside nothing": (
+        lambda: thickness_map(None, ATLAS.mesh),
+        "atlas must be an Atlas.*, got None",
+    ),
     "limits of text": (
         lambda: thickness_map(ATLAS, ATLAS.mesh, "ab"),
-        "limits is 'ab'; valid is a least and",
+        "limits must be a least and .*, got 'ab'",
     ),
-    "no atlas": (lambda: WaveSolver(None), "atlas is None; valid is an Atlas"),
-    "no material": (lambda: WaveSolver(ATLAS, 3), "material is 3; valid is a Material"),
+    "no atlas": (lambda: WaveSolver(None), "atlas must be an Atlas.*, got None"),
+    "no material": (lambda: WaveSolver(ATLAS, 3), "material must be a Material.*, got 3"),
     "point of text": (
         lambda: WAVES.add_impulse("abc", 1, 1),
-        "points are 'abc'; valid are numbers",
+        "points must be numbers .*, got 'abc'",
     ),
     "huge impulse": (
         lambda: WAVES.add_impulse([1, 0, 0], HUGE, 1),
-        "impulse is 1000.* N s; valid is a finite number",
+        "impulse must be a finite number.*, got 1000.* N s",
     ),
     "height of text": (
         lambda: setattr(WAVES, "height", "a"),
-        "height is 'a'; valid is a number, or an array",
+        "height must be a number, or an array .*, got 'a'",
     ),
-    "speed of text": (lambda: ATLAS.stiffness("a"), "speed is 'a'; valid is a number, or an array"),
-    "no path": (lambda: ATLAS.save(None), "path is None; valid is a path"),
-    "path with NUL": (lambda: load_mesh("a\0b"), r"path is 'a\\x00b'; valid is a path"),
-    "atlas from nothing": (lambda: load_atlas(None), "path is None; valid is a path"),
+    "speed of text": (
+        lambda: ATLAS.stiffness("a"),
+        "speed must be a number, or an array .*, got 'a'",
+    ),
+    "no path": (lambda: ATLAS.save(None), "path must be a path.*, got None"),
+    "path with NUL": (lambda: load_mesh("a\0b"), r"path must be a path.*, got 'a\\x00b'"),
+    "atlas from nothing": (lambda: load_atlas(None), "path must be a path.*, got None"),
     "long name": (lambda: load_mesh("a" * 5000), "cannot be read: File name too long"),
     "long atlas": (lambda: load_atlas("a" * 5000), "atlas file 'aaa.*File name too long"),
     "long scene": (lambda: load_scene("a" * 5000), "there is no scene 'aaa"),
-    "no mesh": (lambda: build_atlas(None), "mesh is None; valid is a Mesh"),
+    "no mesh": (lambda: build_atlas(None), "mesh must be a Mesh.*, got None"),
     "radius of text": (
         lambda: sphere_atlas(radius="a"),
-        "radius is 'a'; valid is a finite number greater than 0",
+        "radius must be a finite number greater than 0, got 'a'",
     ),
     "steps of text": (
         lambda: RIPPLES.mj_step(mujoco.MjData(MODEL), nstep="a"),
-        "nstep is 'a'; valid is a whole number, 0 or greater",
+        "nstep must be a whole number, 0 or greater, got 'a'",
     ),
 }
 

@@ -1,4 +1,4 @@
-"""What cannot fit into memory is refused before it is begun; files are complete or not there; images have a limit."""
+"""Too large a request is refused early; files are complete or absent; image limits."""
 
 import contextlib
 import os
@@ -291,5 +291,5 @@ def test_an_image_that_does_not_fit_into_memory_is_refused(
 def test_archives_are_not_unpacked(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"ball.{ending}"
     path.write_bytes(b"PK\x03\x04")
-    with pytest.raises(RippleError, match=r"unknown ending; valid are .* unpacked"):
+    with pytest.raises(RippleError, match=r"unknown ending: .* unpacked"):
         load_mesh(path)

@@ -1,4 +1,4 @@
-"""What every compiled kernel promises: numpy's division, no fast-math unasked; and what is told of compiling."""
+"""Compiled kernels divide as numpy does, without fast-math; messages of compiling."""
 
 import importlib
 import io
@@ -199,7 +199,10 @@ from ripple_sim.solver import Material, WaveSolver, sphere_atlas, texel_atlas
 results = {}
 for name, atlas in {"sphere": sphere_atlas(1.0, 4), "square": texel_atlas(square(4))}.items():
     plain = Material(speed=1.0)
-    every = Material(speed=1.0, bending=1e-3, viscosity=1e-3, yield_height=1e-3, density=2 + atlas.positions[..., 1])
+    density = 2 + atlas.positions[..., 1]
+    every = Material(
+        speed=1.0, bending=1e-3, viscosity=1e-3, yield_height=1e-3, density=density
+    )
     for kind, material in {"plain": plain, "every": every}.items():
         waves = WaveSolver(atlas, material, backend="cpu")
         waves.add_impulse([0.2, 0.3, 1.0], 0.1, 0.6)
@@ -211,7 +214,7 @@ for name, atlas in {"sphere": sphere_atlas(1.0, 4), "square": texel_atlas(square
 
 
 def test_without_compilation_waves_are_the_same() -> None:
-    """NUMBA_DISABLE_JIT: impulses find their texels, and loops run over fields and numbers, in plain Python."""
+    """NUMBA_DISABLE_JIT: footprints and loops over fields work in plain Python."""
     compiled: dict[str, dict[str, np.ndarray]] = {"results": {}}
     exec(WAVES, compiled)
     save = (

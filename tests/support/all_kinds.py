@@ -1,4 +1,4 @@
-"""Surfaces of every kind: with handles, holes and twists, in many parts, and of hardly any triangles."""
+"""Surfaces of every kind: handles, holes, twists, many parts, few triangles."""
 
 import igl
 import numpy as np
@@ -21,7 +21,7 @@ def torus() -> Arrays:
 
 
 def thickened_graph(genus: int, seed: int, radius: float = 0.28, spacing: float = 0.13) -> Arrays:
-    """Tubes along a random connected graph, which has as many independent cycles as the surface has handles."""
+    """Tubes along a random connected graph; its independent cycles are the handles."""
     ends = graph(genus, np.random.default_rng(seed))
     low = ends.min(axis=(0, 1)) - 0.5
     high = ends.max(axis=(0, 1)) + 0.5
@@ -62,7 +62,7 @@ def graph(genus: int, rng: np.random.Generator, size: int = 3) -> NDArray[np.flo
 
 
 def punctured_ball(seed: int, holes: int, subdivisions: int = 3) -> Arrays:
-    """A ball without the triangles round some of its vertices, no two of which are near each other."""
+    """A ball without the triangles round some vertices that are not near each other."""
     ball = trimesh.creation.icosphere(subdivisions=subdivisions)
     V = np.array(ball.vertices)
     F = np.array(ball.faces)
@@ -140,7 +140,7 @@ def needles(count: int, thickness: float = 1e-6) -> Arrays:
 
 
 def voxels(filled: NDArray[np.bool_]) -> Arrays:
-    """Triangles of all sides of filled cells that border on an empty one, each with vertices of its own."""
+    """Triangles between filled and empty cells, each with vertices of its own."""
     room = np.pad(filled, 1)
     squares = []
     for axis in range(3):
@@ -159,7 +159,7 @@ def voxels(filled: NDArray[np.bool_]) -> Arrays:
 
 
 def shuffled(V: NDArray, F: NDArray, seed: int, turned: float = 0.0, loose: bool = False) -> Arrays:
-    """The same triangles in another order, a share of them turned over, each with vertices of its own if `loose`."""
+    """The same triangles in another order, a share of them flipped; `loose` splits vertices."""
     rng = np.random.default_rng(seed)
     F = F[rng.permutation(len(F))]
     F = np.where(rng.random(len(F))[:, None] < turned, F[:, ::-1], F)

@@ -22,9 +22,10 @@ def cube_rotations() -> NDArray[np.float64]:
 
 
 def permute_texels(field: NDArray, transform: NDArray[np.float64]) -> NDArray:
-    """Move a field [6, N, N, ...] by one of the cube's 48 symmetries (a 3 x 3 signed permutation matrix).
+    """Move a field [6, N, N, ...] by one of the cube's 48 symmetries.
 
-    The result r satisfies r(transform @ d) = field(d) for the texel directions d.
+    `transform` is a signed permutation matrix [3, 3]. The result r satisfies
+    r(transform @ d) = field(d) for the texel directions d.
     """
     n = field.shape[1]
     directions = texel_directions(n).reshape(-1, 3)

@@ -18,7 +18,8 @@ SPOT = '<light pos="{} 0 2" dir="{} 0 -1" diffuse=".9 .9 .9" cutoff="60" exponen
 
 def frame_of(gl, body, *, asset="", visual="", camera=ABOVE, targets=None, size=SIZE, **options):
     """Frame, as integers, of a scene given by the contents of its MJCF's elements."""
-    xml = f"<mujoco><visual>{visual}</visual><asset>{asset}</asset><worldbody>{body}</worldbody></mujoco>"
+    xml = f"<mujoco><visual>{visual}</visual><asset>{asset}</asset><worldbody>{body}</worldbody>"
+    xml += "</mujoco>"
     model, data = posed(xml)
     surfaces = {model.geom(name).id: surface for name, surface in (targets or {}).items()}
     with Renderer(gl, model, surfaces, size=size, **options) as renderer:

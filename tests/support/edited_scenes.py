@@ -1,4 +1,4 @@
-"""Edits of a scene between `update_scene` and `render`, which MuJoCo's own renderer and ours both draw.
+"""Edits of a scene between `update_scene` and `render`, which both renderers draw.
 
 As a program it draws them with `mujoco.Renderer`, which takes over the process's OpenGL context, to
 an .npz file.
@@ -16,8 +16,10 @@ GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
 DYNAMIC = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
 _MODEL = """<mujoco><visual><quality numslices="128" numstacks="64"/></visual>
 <asset><mesh name="tet" vertex="0 0 0 .8 0 0 0 .8 0 0 0 .8"/></asset><worldbody>
-<light pos="0 -1 4" dir="0 .2 -1" diffuse=".6 .6 .6"/><camera name="c" pos="0 -6 3" xyaxes="1 0 0 0 .45 1"/>
-<geom name="floor" type="plane" size="5 5 .1"/><geom name="target" size=".4" pos="1 0 .5" rgba=".7 .2 .2 1"/>
+<light pos="0 -1 4" dir="0 .2 -1" diffuse=".6 .6 .6"/>
+<camera name="c" pos="0 -6 3" xyaxes="1 0 0 0 .45 1"/>
+<geom name="floor" type="plane" size="5 5 .1"/>
+<geom name="target" size=".4" pos="1 0 .5" rgba=".7 .2 .2 1"/>
 <body name="link" pos="-1 0 .5"><freejoint/><geom type="mesh" mesh="tet" rgba=".2 .7 .2 1"/></body>
 <geom name="box" type="box" size=".2 .3 .2" pos="0 1 .4" rgba=".2 .3 .8 1"/></worldbody></mujoco>"""
 

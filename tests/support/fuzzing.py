@@ -1,4 +1,4 @@
-"""How long fuzzing goes on, what strange values and damages are made of, and what may come of them."""
+"""Fuzzing: its length, the strange values and damages, and the allowed outcomes."""
 
 import contextlib
 import copy
@@ -24,7 +24,7 @@ EXAMPLES = int(os.environ.get("RIPPLE_SIM_FUZZ", "0"))
 
 
 def fuzzed_by(usual: int, share: float = 1.0) -> settings:
-    """Settings for so many examples in the tests, and for a share of those that `make fuzz` asks for."""
+    """Settings for a number of examples in the tests, and for a share of `make fuzz`."""
     return settings(
         max_examples=max(1, round(EXAMPLES * share)) if EXAMPLES else usual,
         derandomize=not EXAMPLES,
@@ -61,7 +61,7 @@ def outcome(call: Callable[[], Any]) -> Any:
 
 
 def command(*words: object) -> int:
-    """Exit status of the program, run in this process; it says one line if it fails, beside warnings and news."""
+    """Exit status of the program in this process; a failure prints one line."""
     err = io.StringIO()
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(err):
         status = cli.main([*map(str, words)])

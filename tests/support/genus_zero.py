@@ -93,7 +93,7 @@ SHAPES = {
 
 
 def stretch_quantiles(V, F, S, quantiles=(0.001, 0.01, 0.5, 0.99, 0.999)):
-    """Area-weighted quantiles of the stretch: the value that a given share of the real area stays under."""
+    """Quantiles of the stretch by area: the value that a share of the area stays under."""
     values = stretch(V, F, S)
     weights = igl.doublearea(V, F)
     order = np.argsort(values, kind="stable")

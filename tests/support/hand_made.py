@@ -49,7 +49,7 @@ def _corners_to_places(corners: np.ndarray, topology: TexelTopology) -> np.ndarr
 
 
 def flat_charts(corners, glued, n: int) -> TexelMesh:
-    """Flat charts in space by their corners [C, 4, 3], counter-clockwise, cell-centred: the surface ends at the rim."""
+    """Flat charts by their corners [C, 4, 3], counter-clockwise; texels at cell centres."""
     topology = glue(np.array(glued), n)
     places = _corners_to_places(np.asarray(corners, dtype=np.float64), topology)
     return TexelMesh.of(topology, places[:, 1:-1, 1:-1], beyond=places)

@@ -55,7 +55,7 @@ class Run:
 
 
 def contact_forces(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Forces [N] and torques [N m] of MuJoCo's contacts in their own frames, [k, 6]: the first is the normal force."""
+    """Forces [N] and torques [N m] of contacts in their frames, [k, 6]; normal force first."""
     wrenches = np.zeros((data.ncon, 6))
     for i, wrench in enumerate(wrenches):
         mujoco.mj_contactForce(model, data, i, wrench)

@@ -27,7 +27,7 @@ def whole_level(V, F):
 
 
 def assembled(level, S, reference):
-    """The tangents [n, 2, 3] at a map's vertices, the Newton system there, and its Hessian as one matrix."""
+    """The tangents [n, 2, 3] at a map's vertices, the Newton system, and its Hessian."""
     n = len(S)
     system = System.zeros(n, len(level.ends))
     x = np.empty_like(S)

@@ -35,7 +35,7 @@ def ply(
     length: str = "uchar",
     texcoord: bool = False,
 ) -> bytes:
-    """PLY file with an element of edges between vertices and faces, and properties that mean nothing here."""
+    """PLY file with edges between vertices and faces, and unknown properties."""
     order = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}[layout]
     codes = {"float": "f", "double": "d", "uchar": "B", "ushort": "H", "int": "i"}
     header = ["ply", f"format {layout} 1.0", "comment made here", f"element vertex {len(vertices)}"]

@@ -1,4 +1,4 @@
-"""What bodies and surfaces exchange, by MuJoCo's own account and by that of the bodies' velocities."""
+"""What bodies and surfaces exchange, by MuJoCo and by the bodies' velocities."""
 
 import collections
 import dataclasses
@@ -91,7 +91,7 @@ class MomentumBalance:
             self.pairs[impulse.geom, impulse.other].given += impulse.impulse
 
     def _share_of_pair(self, pair: np.ndarray, shares: dict[int, float]) -> float:
-        """By the lighter body of two geoms, if that is free, or else by the heavier, if that feels it."""
+        """Momentum by the lighter of two bodies if it is free, else by the heavier."""
         mass = self.model.body_mass
         moving = (
             body for body in self.model.geom_bodyid[pair].tolist() if self.model.body_dofnum[body]
@@ -117,7 +117,7 @@ class MomentumBalance:
     def _share(
         self, data: mujoco.MjData, body: int, pushed: np.ndarray, whole: np.ndarray, largest: float
     ) -> float:
-        """Change of a free body's momentum over that which its contacts' normal forces account for."""
+        """A free body's change of momentum that its contacts' normal forces do not explain."""
         start = self.model.body_dofadr[body]
         mass = self.model.body_mass[body]
         gravity = self.model.opt.gravity

@@ -19,7 +19,7 @@ _pointer = ctypes.c_void_p
 
 @contextlib.contextmanager
 def own_context() -> Iterator[EGLCurrent]:
-    """Make a second context on the first device and leave it current, once, drawing to one surface, reading another."""
+    """Make a second context current that draws to one surface and reads from another."""
     egl = load_egl()
     address = egl.eglGetProcAddress
     find_devices = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, _pointer, _pointer)(

@@ -10,7 +10,7 @@ from typing import Any
 
 
 def ended(*words: Any, **options: Any) -> subprocess.CompletedProcess[str]:
-    """A Python process with these words that has ended, with what it said; options are those of `subprocess.run`."""
+    """A Python process with these arguments, after its end; options of `subprocess.run`."""
     return subprocess.run(
         [sys.executable, *words],
         **{"capture_output": True, "text": True, "check": False, **options},

@@ -11,7 +11,7 @@ _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 
 
 class RandomHit:
-    """A random model whose hitters are on their way to the target; the first hit is over after so many `steps`."""
+    """A random model whose hitters approach the target; the first hit ends after `steps`."""
 
     def __init__(self, random: RandomModel) -> None:
         self._random = random
@@ -51,7 +51,7 @@ class RandomHit:
         mujoco.mj_forward(self.model, self.data)
 
     def _drive(self, ways: list[np.ndarray]) -> None:
-        """Switch motors and suckers on, towards the target, and choose velocities of mocap bodies [m/s]."""
+        """Switch motors and suckers on towards the target; choose mocap velocities [m/s]."""
         model = self.model
         self._drift = np.zeros((self.model.nmocap, 3))
         driven = {f"hitter {i}": -way for i, way in enumerate(ways)} | {"target": 0.3 * ways[0]}

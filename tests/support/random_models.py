@@ -1,4 +1,4 @@
-"""Random MuJoCo models: shapes, mounts, contact parameters, solvers, masses and scales of all kinds, by a seed."""
+"""Random MuJoCo models by seed: shapes, mounts, contacts, solvers, masses, scales."""
 
 import functools
 
@@ -40,11 +40,26 @@ INTEGRATORS = {"Euler": 0.3, "implicit": 0.15, "implicitfast": 0.35, "RK4": 0.1,
 FLAGS = [
     flag
     for flag in (
-        "equality", "frictionloss", "limit", "damper", "spring", "clampctrl", "filterparent", "refsafe", "sensor",
-        "midphase", "eulerdamp", "autoreset", "energy", "fwdinv", "invdiscrete", "diagexact",
+        "equality",
+        "frictionloss",
+        "limit",
+        "damper",
+        "spring",
+        "clampctrl",
+        "filterparent",
+        "refsafe",
+        "sensor",
+        "midphase",
+        "eulerdamp",
+        "autoreset",
+        "energy",
+        "fwdinv",
+        "invdiscrete",
+        "diagexact",
     )
-    if hasattr(mujoco.mjtEnableBit, f"mjENBL_{flag.upper()}") or hasattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}")
-]  # fmt: skip
+    if hasattr(mujoco.mjtEnableBit, f"mjENBL_{flag.upper()}")
+    or hasattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}")
+]
 SCALES = (1e-3, 0.03, 1.0, 30.0, 1e3)
 
 
@@ -175,7 +190,7 @@ class RandomModel:
         return f'<body name="{name}" {place} quat="{turned}"><freejoint/>{geom}</body>'
 
     def _drive(self, i: int, force: float) -> None:
-        """Motors of three joints that push with a force [N], or direct current motors that begin with it."""
+        """Motors of three joints with a force [N], or direct current motors."""
         constant = 1 / (NO_LOAD * self.speed)
         motor = "motor"
         matter = f'gear="{force}"'
@@ -283,7 +298,8 @@ class RandomModel:
         gravity = vector(
             0.1 * self.speed / self.stopping * rng.standard_normal(3) * (rng.random() < 0.5)
         )
-        return f"""<option timestep="{self.timestep:.6g}" integrator="{integrator}" solver="{solver}" cone="{cone}"
+        return f"""<option timestep="{self.timestep:.6g}" integrator="{integrator}"
+          solver="{solver}" cone="{cone}"
             jacobian="{jacobian}" noslip_iterations="{noslip}" gravity="{gravity}"
             sdf_initpoints="50" impratio="{rng.choice([1, 1, 10])}" {overrides}>
             <flag {text}/></option>"""

@@ -36,7 +36,7 @@ _cleanup = weakref.finalize(_folder, _folder.cleanup)
 
 
 def _source(include: str, expression: str, defines: dict[str, object]) -> str:
-    """Source of a fragment shader made here that includes one of the renderer's files, by the loader itself."""
+    """A fragment shader that includes one of the renderer's files by the real loader."""
     package = Path(_folder.name, _PACKAGE)
     if not package.exists():
         shutil.copytree(

@@ -11,7 +11,8 @@ from ripple_sim.batch import BatchFolder, Plan, keep_plan, read_plan, stored
 MJCF = """<mujoco><option timestep="0.005"/><worldbody><light name="key" pos="0 0 3"/>
 <geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
 <body name="stone" pos="0.05 0 0.28"><freejoint/><geom name="stone" size="0.05"/></body>
-<body name="grain" pos="-0.05 0 0.28"><freejoint/><geom name="grain" size="0.03"/></body></worldbody></mujoco>"""
+<body name="grain" pos="-0.05 0 0.28"><freejoint/><geom name="grain" size="0.03"/></body>
+</worldbody></mujoco>"""
 
 SCENE = """model = "scene.xml"
 duration = 0.2

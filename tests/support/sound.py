@@ -6,7 +6,7 @@ from ripple_sim.solver import Mesh
 
 
 def assert_sound(mesh: Mesh) -> None:
-    """Manifold, wound alike, all vertices in use, no triangle without area, closed parts outward."""
+    """Manifold, wound alike, all vertices in use, no empty triangle, closed parts outward."""
     F = mesh.F
     assert F.min() == 0
     assert len(np.unique(F)) == len(mesh.V) == F.max() + 1
@@ -36,7 +36,7 @@ def assert_sound(mesh: Mesh) -> None:
 
 
 def assert_single_fans(F: np.ndarray) -> None:
-    """At every vertex the triangles hang together: walking from side to side reaches all of them."""
+    """At every vertex the triangles are connected over their sides."""
     onward: dict[int, dict[int, int]] = {}
     for a, b, c in [*F.tolist(), *F[:, [1, 2, 0]].tolist(), *F[:, [2, 0, 1]].tolist()]:
         onward.setdefault(a, {})[b] = c

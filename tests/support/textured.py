@@ -14,7 +14,8 @@ def textured_model(
 ):
     """Model of a body with the material "m"; `attributes` are the material's."""
     texture = TEXTURE.format(kind=kind, height=64 if kind == "2d" else 384)
-    xml = f"<mujoco><asset>{texture}{material.format(attributes)}{asset}</asset><worldbody>{body}</worldbody></mujoco>"
+    xml = f"<mujoco><asset>{texture}{material.format(attributes)}{asset}</asset>"
+    xml += f"<worldbody>{body}</worldbody></mujoco>"
     model = mujoco.MjModel.from_xml_string(xml)
     squares = np.array([["r", "g"], ["b", "y"]]).repeat(32, axis=0).repeat(32, axis=1)
     image = np.array([[COLORS[name] for name in row] for row in squares], dtype=np.uint8)

@@ -15,7 +15,7 @@ def rms(waves: WaveSolver) -> float:
 
 
 class WithAndWithout:
-    """The geom "target" of a model, with the filter and without; `history` has their velocities step by step [m/s]."""
+    """The geom "target" with the filter and without; `history` has velocities [m/s]."""
 
     def __init__(self, model: mujoco.MjModel, material: Material, resolution: int) -> None:
         options = {"backend": "cpu", "conserve_volume": False}

@@ -9,8 +9,10 @@ from scene_files import write_scene
 
 from ripple_sim.scene import Scene, load_scene
 
-MJCF = """<mujoco><option timestep="0.005"/><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
-<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
+MJCF = """<mujoco><option timestep="0.005"/><worldbody>
+<geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
+<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody>
+</mujoco>"""
 TOML = """model = "scene.xml"
 duration = {}
 [[ripple]]
@@ -49,9 +51,15 @@ import json, resource, signal, sys
 import numpy as np
 from ripple_sim.errors import EncodingError
 from ripple_sim.encode import open_writer
-path, limit, width, height, count, options = sys.argv[1], *map(int, sys.argv[2:6]), json.loads(sys.argv[6])
-noise = np.random.default_rng(0).integers(0, 31743, (count, height, width, 3), np.uint16).view(np.float16)
-noise = noise if options.get("frame_format") == "exr" else (noise.view(np.uint16) % 256).astype(np.uint8)
+path = sys.argv[1]
+limit, width, height, count = map(int, sys.argv[2:6])
+options = json.loads(sys.argv[6])
+shape = (count, height, width, 3)
+noise = np.random.default_rng(0).integers(0, 31743, shape, np.uint16)
+if options.get("frame_format") == "exr":
+    noise = noise.view(np.float16)
+else:
+    noise = (noise % 256).astype(np.uint8)
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 try:

@@ -30,24 +30,32 @@ WORLDS = {
     "meshes": """<geom type="mesh" mesh="rock" euler="10 20 30"/>
         <geom type="mesh" mesh="rock" pos="-.3 -.3 .3" rgba="0 1 0 .5"/>""",
     "height field": """<geom type="hfield" hfield="hills"/><geom size=".1" pos="0 0 .3"/>""",
-    "planes": """<geom type="plane" size="0 0 1" pos="0 0 -.2"/><geom type="plane" size=".3 .2 1" pos=".3 0 .3"
+    "planes": """<geom type="plane" size="0 0 1" pos="0 0 -.2"/>
+    <geom type="plane" size=".3 .2 1" pos=".3 0 .3"
         euler="0 30 0"/>""",
-    "planes from behind": """<geom type="plane" size="2 2 1" pos="0 0 2"/><geom type="plane" size=".5 .6 1"
-        euler="180 0 0"/><geom type="plane" size=".3 .4 1" pos="-.4 .4 .3" euler="70 0 40" rgba="1 0 0 .4"/>
+    "planes from behind": """<geom type="plane" size="2 2 1" pos="0 0 2"/>
+    <geom type="plane" size=".5 .6 1"
+        euler="180 0 0"/>
+        <geom type="plane" size=".3 .4 1" pos="-.4 .4 .3" euler="70 0 40" rgba="1 0 0 .4"/>
         <geom size=".2" pos="0 0 -.3"/>""",
     "sites and tendons": """<site name="a" type="box" size=".1 .1 .1" pos="-.3 0 0"/>
         <site name="hidden" size=".3" group="4"/>
-        <body pos=".3 0 .2"><freejoint/><geom size=".05"/><site name="b" type="capsule" size=".03 .1"/></body>""",
-    "flex and skin": """<flexcomp name="cloth" type="grid" count="5 5 1" spacing=".1 .1 .1" dim="2" radius=".001"
+        <body pos=".3 0 .2"><freejoint/><geom size=".05"/>
+        <site name="b" type="capsule" size=".03 .1"/></body>""",
+    "flex and skin": """<flexcomp name="cloth" type="grid" count="5 5 1" spacing=".1 .1 .1"
+      dim="2" radius=".001"
         pos="0 0 .2"><edge equality="true"/></flexcomp>""",
-    "edges and vertices of a flex": """<flexcomp name="cloth" type="grid" count="4 4 1" spacing=".15 .15 .1" dim="2"
+    "edges and vertices of a flex": """<flexcomp name="cloth" type="grid" count="4 4 1"
+      spacing=".15 .15 .1" dim="2"
         radius=".03" pos="0 0 .2" euler="20 0 0"><edge equality="true"/></flexcomp>""",
     "contacts and joints": """<geom type="plane" size="1 1 1"/><body pos="0 0 .099"><freejoint/>
         <geom type="box" size=".1 .1 .1"/></body>
         <body pos=".5 0 .5"><joint/><geom type="capsule" size=".03 .1"/></body>""",
 }
-_SEVERAL = """<geom type="plane" size="0 0 1" pos="0 0 -.2"/><geom type="box" size=".3 .2 .1" euler="20 30 40"/>
-    <geom size=".2" pos=".4 .2 .2"/><geom type="capsule" size=".05 .2" pos="0 -.4 .1" euler="30 60 0"/>"""
+_SEVERAL = """<geom type="plane" size="0 0 1" pos="0 0 -.2"/>
+<geom type="box" size=".3 .2 .1" euler="20 30 40"/>
+    <geom size=".2" pos=".4 .2 .2"/>
+    <geom type="capsule" size=".05 .2" pos="0 -.4 .1" euler="30 60 0"/>"""
 _SENSOR = 'resolution="128 96" sensorsize="8e-3 6e-3"'
 _SHALLOW = '<statistic extent="1"/><visual><map znear="1.75" zfar="2.2"/></visual>'
 # by world: attributes of its camera, and what else the model says of cameras
@@ -69,7 +77,8 @@ _TENDON = '<tendon><spatial width=".02"><site site="a"/><site site="b"/></spatia
 
 # What lights a scene and what is around it: an MJCF's `<visual>`, skybox and lamp, and flags of the
 # scene that are set.
-_STARS = """<texture type="skybox" builtin="gradient" rgb1=".5 .6 .7" rgb2=".1 .2 .3" width="256" height="256"
+_STARS = """<texture type="skybox" builtin="gradient" rgb1=".5 .6 .7" rgb2=".1 .2 .3" width="256"
+  height="256"
     mark="random" markrgb="1 1 1"/>"""
 _LAMP = '<light pos="0 0 6" dir="0 0 -1"/>'
 _FOGGY = '<rgba fog=".6 .3 .2 1" haze=".2 .9 .3 1"/><map fogstart="1" fogend="8"/>'
@@ -92,13 +101,15 @@ _PLANES = {
         'pos="0 -4 2" xyaxes="1 0 0 0 .6 1"',
     ),
     "transparent ball": (
-        """<geom type="plane" size="0 0 1" rgba=".4 .4 .4 1"/><geom size=".6" pos="0 0 .7" rgba=".8 .3 .2 .4"/>
+        """<geom type="plane" size="0 0 1" rgba=".4 .4 .4 1"/>
+        <geom size=".6" pos="0 0 .7" rgba=".8 .3 .2 .4"/>
         <geom type="box" size=".9 .1 .9" pos="0 1.5 .9" rgba=".2 .2 .9 1"/>""",
         'pos="0 -4 1.2" xyaxes="1 0 0 0 .2 1"',
     ),
     "table over a floor": (
         """<geom type="plane" size="0 0 1" rgba=".5 .5 .5 1"/>
-        <geom type="plane" size=".8 .6 1" pos="0 0 .7" rgba=".9 .1 .1 1"/><geom size=".2" pos="0 0 .9"/>""",
+        <geom type="plane" size=".8 .6 1" pos="0 0 .7" rgba=".9 .1 .1 1"/>
+        <geom size=".2" pos="0 0 .9"/>""",
         'pos="0 -4 2" xyaxes="1 0 0 0 .5 1"',
     ),
     "table": (
@@ -138,7 +149,8 @@ def lit_state(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
         )
     return posed(f"""<mujoco><visual>{visual}</visual><asset>{asset}
         <material name="floor" rgba=".4 .5 .4 1" reflectance=".3"/></asset><worldbody>{lamp}
-        <geom type="plane" size="0 0 1" material="floor"/><geom size=".4" pos="-.3 0 .5" rgba=".8 .5 .3 1"/>
+        <geom type="plane" size="0 0 1" material="floor"/>
+        <geom size=".4" pos="-.3 0 .5" rgba=".8 .5 .3 1"/>
         <geom type="box" size=".3 .3 .3" pos=".8 .4 .6" rgba=".3 .7 .4 1"/>
         <camera name="side" pos="0 -4 1.2" xyaxes="1 0 0 0 .2 1"/></worldbody></mujoco>""")
 
@@ -161,8 +173,10 @@ def state_of(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A model with a sphere called "target" beside the rest, in its first state."""
     camera, view = CAMERAS.get(name, ('fovy="50"', ""))
     return posed(f"""<mujoco>{_FINE}{view}<asset><mesh name="rock" vertex="{_CORNERS}"/>
-        <hfield name="hills" nrow="8" ncol="8" size=".5 .5 .3 .1" elevation="{_BUMPS}"/></asset><worldbody>
-        {_TARGET}{WORLDS[name]}<camera name="side" pos="1.2 -1.2 .9" xyaxes="1 1 0 -.3 .3 1" {camera}/>
+        <hfield name="hills" nrow="8" ncol="8" size=".5 .5 .3 .1" elevation="{_BUMPS}"/></asset>
+        <worldbody>
+        {_TARGET}{WORLDS[name]}<camera name="side" pos="1.2 -1.2 .9"
+          xyaxes="1 1 0 -.3 .3 1" {camera}/>
         </worldbody>{_TENDON if "tendon" in name else ""}</mujoco>""")
 
 

@@ -10,9 +10,9 @@ from ripple_sim.solver import Atlas, WaveSolver
 
 
 class WaveHeights:
-    """Greatest height of a target's waves over the half of the local thickness, and greatest share of it that is steep.
+    """Greatest height of the waves over half the local thickness, and greatest steep share.
 
-    `highest`, and `steepest`: of what was seen by `look`.
+    `highest` and `steepest` are the greatest values that calls of `look` have seen.
     """
 
     def __init__(self, atlas: Atlas, steep: float) -> None:
@@ -33,7 +33,7 @@ class WaveHeights:
 
     @functools.cached_property
     def _radius(self) -> np.ndarray:
-        """Half the way to the object's other side [m], [C n n]; a half of its size at most, a hundredth at least."""
+        """Half the distance to the other side [m], [C, n, n], within limits by the size."""
         atlas = self._atlas
         tree = igl.AABB()
         V = atlas.mesh.V / self._size
@@ -55,7 +55,7 @@ class WaveHeights:
 
     @functools.cached_property
     def _quads(self) -> tuple[np.ndarray, np.ndarray]:
-        """Duals of the sides of the charts' quads from their first corner, [C, n - 1, n - 1, 3, 2], and areas."""
+        """Dual vectors of the quads' sides, [C, n - 1, n - 1, 3, 2], and areas."""
         P = self._atlas.positions
         sides = np.stack([P[:, :-1, 1:] - P[:, :-1, :-1], P[:, 1:, :-1] - P[:, :-1, :-1]], axis=-1)
         areas = np.linalg.norm(np.cross(sides[..., 0], sides[..., 1]), axis=-1)

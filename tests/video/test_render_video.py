@@ -288,12 +288,12 @@ def test_passes_of_another_video_are_not_replaced(scene: Scene, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"supersample": 0}, "supersample is 0; valid is a whole number, 1 or greater"),
-        ({"size": None}, "size is None; valid is (int, int)"),
-        ({"size": "64x36"}, "size is '64x36'; valid is (int, int)"),
+        ({"supersample": 0}, "supersample must be a whole number, 1 or greater, got 0"),
+        ({"size": None}, "size must be (int, int), got None"),
+        ({"size": "64x36"}, "size must be (int, int), got '64x36'"),
         (
             {"size": (0, 0)},
-            "size is (0, 0); valid is (width, height) in pixels, two whole numbers greater than 0",
+            "size must be (width, height) in pixels, two whole numbers greater than 0, got (0, 0)",
         ),
         ({"fps": 0}, "fps is 0; valid is a whole number, 1 or greater"),
         ({"fps": np.nan}, "fps is nan; valid is int"),
@@ -330,6 +330,7 @@ def test_a_camera_that_the_model_lacks_is_refused_before_anything_is_written(
 @pytest.mark.parametrize("name", ["progress", "on_step", "on_frame"])
 def test_what_is_called_must_be_a_function(scene: Scene, tmp_path: Path, name: str) -> None:
     with pytest.raises(
-        VideoError, match=f"^{name.replace('_', ' ')} is 3; valid is a function, or None$"
+        VideoError, match=f"^{name.replace('_', ' ')} must be a function, or None, got 3$"
     ):
-        render_video(scene, tmp_path / "o.mp4", VideoOptions(), **{name: 3})  # type: ignore[arg-type]
+        options = VideoOptions()
+        render_video(scene, tmp_path / "o.mp4", options, **{name: 3})  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Checks of MuJoCo's viewer with ripples; `test_passive.py` runs them in a process and on a screen of their own."""
+"""Checks of MuJoCo's viewer with ripples, which `test_passive.py` runs in a process."""
 
 import time
 from collections.abc import Iterator
@@ -13,7 +13,8 @@ from ripple_sim.errors import SceneError
 from ripple_sim.viewer import RippleViewer
 
 MODEL = """<mujoco><visual><headlight ambient=".3 .3 .3"/></visual>
-<asset><material name="clay" rgba=".9 .6 .3 1"/></asset><worldbody><geom type="plane" size="2 2 .1"/>
+<asset><material name="clay" rgba=".9 .6 .3 1"/></asset><worldbody>
+<geom type="plane" size="2 2 .1"/>
 <body pos="0 0 .4"><geom name="egg" type="ellipsoid" size=".4 .3 .3" material="clay"/></body>
 </worldbody></mujoco>"""
 SIDE = [0.0, -0.3, 0.0]  # towards the camera
@@ -39,7 +40,7 @@ def opened() -> Iterator[tuple[RippleViewer, Ripples, mujoco.MjData]]:
 
 
 def picture(viewer: RippleViewer, other: np.ndarray | None = None) -> np.ndarray:
-    """What is on the screen once it is drawn, in another thread, and differs from another picture."""
+    """The picture on the screen, once it is drawn and differs from another picture."""
     end = time.monotonic() + 60  # a machine that has more to do draws late
     while time.monotonic() < end:
         viewer.sync()

@@ -1,4 +1,4 @@
-"""The viewer's page answers its own user alone: the secret, the page that asks and the size of messages are checked."""
+"""The viewer's page answers its own user alone: secret, origin, message size."""
 
 import asyncio
 import functools

@@ -1,4 +1,4 @@
-"""Screenshots and videos are numbered and whole, or leave nothing; the orbiting camera stays level."""
+"""Screenshots and videos are numbered and whole or absent; the camera stays level."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -92,7 +92,7 @@ def test_a_video_without_frames_leaves_nothing(recorder: Recorder, tmp_path: Pat
 def test_a_window_too_small_for_a_video_is_refused_and_nothing_records(
     recorder: Recorder, tmp_path: Path
 ) -> None:
-    with pytest.raises(VideoError, match="14x14; valid is 16"):
+    with pytest.raises(VideoError, match=r"must be 16 .*, got 14x14"):
         recorder.start(frame(0, 15, 15))
     assert not recorder.recording
     assert names(tmp_path) == []

@@ -1,4 +1,4 @@
-"""The viewer's web page in a headless browser: it loads, the surface moves after a poke, pause and reset work."""
+"""The viewer's page in a headless browser: the surface moves; pause and reset work."""
 
 import io
 import os

@@ -1,4 +1,4 @@
-"""The viewer's window, in processes of its own, and `ripple-sim view`, with a display and without."""
+"""The viewer's window in its own process, and `ripple-sim view`, with and without display."""
 
 import ctypes
 import importlib.util
@@ -106,10 +106,10 @@ def test_a_missing_x11_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None
         (["sphere", "--resolution", "0"], "--resolution.*'0'"),
         (["sphere", "--bodies", "-1"], "--bodies"),
         (["sphere", "--port", "http"], "--port.*'http'"),
-        (["sphere", "--web", "--size", "0x0"], "0x0; valid is 16 to 8192"),
+        (["sphere", "--web", "--size", "0x0"], "must be 16 to 8192 .*, got 0x0"),
         (
             ["sphere", "--benchmark", "--size", "999999x999999"],
-            "999999x999999; valid is 16 to 8192",
+            "must be 16 to 8192 .*, got 999999x999999",
         ),
     ],
 )

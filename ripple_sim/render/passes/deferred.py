@@ -283,8 +283,8 @@ class DeferredShading:
             limit = int(ctx.info["GL_MAX_RENDERBUFFER_SIZE"])
         if not (1 <= width <= limit and 1 <= height <= limit):
             raise RippleError(
-                f"frame size is {width}x{height} pixels; valid with this driver are 1 to {limit} "
-                "along each side: choose a size within that"
+                f"frame size must be 1 to {limit} pixels along each side with this driver, got "
+                f"{width}x{height}"
             )
 
     def clear(self, ctx: moderngl.Context) -> None:

@@ -150,13 +150,12 @@ class HeatmapTexture:
         """
         if values.shape != self._shape:
             raise RippleError(
-                f"the heatmap's values have shape {list(values.shape)}; valid is "
-                f"{list(self._shape)}: charts with a "
-                "halo of one texel"
+                f"the heatmap's values must have shape {list(self._shape)} (charts with a halo "
+                f"of one texel), got {list(values.shape)}"
             )
         if not (np.isfinite(limit) and limit > 0):
             raise RippleError(
-                f"the heatmap's limit is {limit!r}; valid is a positive, finite number"
+                f"the heatmap's limit must be a positive, finite number, got {limit!r}"
             )
         write_page(self._values, self._page, 0, values)
         self._limit = float(limit)

@@ -362,7 +362,7 @@ class SceneLight:
     def __init__(self, assets: Assets, lighting: str, backdrop: bool = True) -> None:
         if lighting not in LIGHTING:
             raise RippleError(
-                f"lighting is {lighting!r}; valid are {', '.join(map(repr, LIGHTING))}"
+                f"lighting must be one of {', '.join(map(repr, LIGHTING))}, got {lighting!r}"
             )
         self._model = model = assets.model
         self._lighting = lighting

@@ -80,7 +80,7 @@ LOOKS: dict[str, Look] = {
 def find_look(name: str) -> Look:
     """Return the look called `name`, or raise `RippleError` with the valid names."""
     if name not in LOOKS:
-        raise RippleError(f"look is {name!r}; valid are {', '.join(map(repr, LOOKS))}")
+        raise RippleError(f"look must be one of {', '.join(map(repr, LOOKS))}, got {name!r}")
     return LOOKS[name]
 
 

@@ -71,8 +71,8 @@ def check_resolution(resolution: int) -> int:
     whole = isinstance(resolution, numbers.Real) and resolution % 1 == 0
     if not whole or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
         raise AtlasError(
-            f"resolution is {resolution!r}; valid is a whole number of texels along a chart's side "
-            f"from {MIN_RESOLUTION} to {MAX_RESOLUTION}"
+            "resolution must be a whole number of texels along a chart's side from "
+            f"{MIN_RESOLUTION} to {MAX_RESOLUTION}, got {resolution!r}"
         )
     return int(resolution)
 

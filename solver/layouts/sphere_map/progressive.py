@@ -68,9 +68,9 @@ from .level import (
     update_triangle,
 )
 
-# Energy density of the sphere map. Long edges cost as much as short ones: the operator's error comes
-# from long texels, at the roots of limbs, and its time step from narrow ones. With the wall `small`
-# 99.9 % of most surfaces have texels less than twice too wide.
+# Energy density of the sphere map. Long edges cost as much as short ones: the operator's error
+# comes from long texels, at the roots of limbs, and its time step from narrow ones. With the wall
+# `small` 99.9 % of most surfaces have texels less than twice too wide.
 SPHERE = Density(power=4, even=1.0, long=1.0, small=0.55**16)
 
 # Sweeps before the Newton steps of a level, at most.

@@ -1,4 +1,4 @@
-"""Deferred shading: which sizes a driver can draw, what surfaces and the floor reflect, and what shows through."""
+"""Deferred shading: frame sizes, reflections of surfaces and floor, and transparency."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def frame(gl, size, camera=CAMERA, **options):
 @pytest.mark.parametrize("size", [(0, 4), (4, 0), (-3, 5), (1_000_000, 4), (4, 1_000_000)])
 def test_a_size_that_the_driver_cannot_draw_is_refused(gl, size):
     with pytest.raises(
-        RippleError, match=rf"frame size is {size[0]}x{size[1]} pixels; valid .* are 1 to \d+"
+        RippleError, match=rf"frame size must be 1 to \d+ .*, got {size[0]}x{size[1]}"
     ):
         frame(gl, size)
 
@@ -91,7 +91,7 @@ def test_ripples_finer_than_a_pixel_look_as_in_a_large_frame_that_is_shrunk(gl, 
 
 
 def test_a_rough_surface_blurs_the_shadows_that_it_reflects(gl):
-    """A wall of metal over a floor with the shadow of a small plate: rough metal shows less of it than smooth metal."""
+    """A metal wall shows less of a small plate's shadow if the metal is rough."""
     body = '<geom type="box" size="1 .1 .6" pos="0 .5 .6" material="m"/>'
     body += '<geom type="box" size=".15 .15 .01" pos="-.6 -.1 .75"/>' + FLOOR
     deepest = []

@@ -1,4 +1,4 @@
-"""The floor and the background: texture, edges, alpha, occlusion of the sky, and interpolation of coarse pixels."""
+"""Floor and background: texture, edges, alpha, occlusion of the sky, coarse pixels."""
 
 import tracemalloc
 from unittest.mock import MagicMock
@@ -14,7 +14,8 @@ from ripple_sim.render.passes import deferred
 from ripple_sim.render.passes.floor import Floor, find_floor
 from ripple_sim.render.visuals import Assets
 
-CHECKER = """<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="{0}" height="{0}"/>
+CHECKER = """<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="{0}"
+  height="{0}"/>
 <material name="c" texture="c" {1}/>"""
 
 
@@ -40,7 +41,7 @@ def test_a_plane_stays_the_floor_under_bodies_that_wait_far_above_it() -> None:
 
 
 def test_a_small_plane_is_no_floor() -> None:
-    """Nor a wall; an infinite plane is one before a large one, and an opaque one before water over it."""
+    """An infinite plane is the floor before a large one, an opaque one before water; no wall is."""
     ground = '<geom type="plane" size="0 0 1"/>'
     large = '<geom type="plane" size="9 9 1" pos="0 0 .1"/>'
     table = '<geom type="plane" size=".8 .6 1" pos="0 0 .5"/>'
@@ -73,7 +74,7 @@ def test_a_table_casts_a_shadow_on_the_floor_and_gives_the_sky_no_colour(gl):
 
 
 def test_floor_texture_repeats_as_in_mujoco(gl):
-    """A repetition of a 2 x 2 checker is 2 m wide and begins at -1 m: squares of 1 m, a corner at the origin."""
+    """A repetition of a 2 x 2 checker is 2 m wide and begins at -1 m: squares of 1 m."""
     asset = CHECKER.format(64, 'texuniform="true"')
     frame = frame_of(gl, '<geom type="plane" size="0 0 .1" material="c"/>', asset=asset)
     pixels = int(0.5 * SIZE[1] / (2 * 4.0 * np.tan(np.radians(20))))  # half a square
@@ -134,7 +135,7 @@ def test_sites_hide_no_sky(gl):
 
 
 def test_a_ceiling_has_the_colour_and_the_light_of_the_floor_below(gl):
-    """A white plate, seen from below, above a red floor that the sun lights: it sees little else."""
+    """A white plate over a red sunlit floor, seen from below, is red."""
     floor = '<geom type="plane" size="0 0 .1" rgba=".9 .2 .2 1"/>'
     plate = '<geom type="box" size=".2 .2 .01" pos="0 0 .6" rgba="1 1 1 1"/>'
     sun = SUN.format(1.0, "true")
@@ -148,7 +149,7 @@ def test_a_ceiling_has_the_colour_and_the_light_of_the_floor_below(gl):
 
 
 def test_a_ball_throws_its_colour_on_the_floor_most_where_it_is_lit(gl):
-    """A red ball makes the floor at its foot redder, a black one does not; the sun shines from the left."""
+    """A red ball reddens the floor at its foot, a black ball does not; sun from the left."""
     floor = FLOOR.replace(".8 .8 .8", ".6 .6 .6")
     ball = '<geom type="sphere" size=".3" pos="0 0 .3" rgba="{} 1"/>'
     metre = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))
@@ -177,7 +178,7 @@ SOLIDS = (
 
 
 def backgrounds(gl, monkeypatch, size, body: str, **options) -> list[np.ndarray]:
-    """Frames whose size is no multiple of a block: with the background that is interpolated, and that of each pixel."""
+    """Frame sizes that are no multiple of a block, with interpolated and exact backgrounds."""
     interpolated = frame_of(gl, body, size=size, **options)
     monkeypatch.setattr(deferred, "CoarseBackground", deferred.Background)
     return [interpolated, frame_of(gl, body, size=size, **options)]
@@ -214,7 +215,7 @@ def test_interpolated_penumbras_end_where_those_of_each_pixel_do(gl, monkeypatch
 
 
 def test_the_colour_of_a_large_image_takes_little_memory() -> None:
-    """All its texels as numbers would take 2 GB; some of them, of what is mixed evenly, have the same mean."""
+    """All texels as numbers take 2 GB; a sample of an even mix has the same mean."""
     body = '<worldbody><geom type="plane" size="1 1 1" material="c"/></worldbody>'
     model = mujoco.MjModel.from_xml_string(
         f"<mujoco><asset>{CHECKER.format(4096, '')}</asset>{body}</mujoco>"

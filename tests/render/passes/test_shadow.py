@@ -1,4 +1,4 @@
-"""Shadows fall where the lights of the MJCF cast them; those of what is transparent are lighter, and hide no other."""
+"""Shadows: in place, lighter for transparent geoms, and none hides another."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_more_lights_than_can_cast_shadows_shine_all_the_same(gl):
 
 
 def test_a_near_light_and_a_sun_cast_shadows_side_by_side(gl):
-    """A lamp at x = -1, 2 m up: the ball's middle at 0.8 m lies in the way to x = 0.67 on the floor."""
+    """Lamp at x = -1, 2 m up: a ball's centre at 0.8 m throws its shadow to x = 0.67."""
     sun = SUN.format(-1.0, "{}").replace(".8 .8 .8", ".4 .4 .4")
     spot = SPOT.format(-1.0, 0.5).replace("/>", ' castshadow="{}"/>')
     places = [int(SIZE[0] / 2 + x * METRE) for x in (-0.8, 0.75)]
@@ -57,10 +57,10 @@ def test_a_near_light_and_a_sun_cast_shadows_side_by_side(gl):
 
 @pytest.mark.parametrize("below", [FLOOR, SLAB], ids=["floor", "solid"])
 def test_a_penumbra_is_as_wide_as_the_light_and_the_height_make_it(gl, below):
-    """A sun of tangent 0.05 shines past the edge of a plate 1.4 m up, under 45 degrees: what is below lies 2 m behind.
+    """A sun of tangent 0.05 at 45 degrees over the edge of a plate 1.4 m up.
 
-    A solid casts shadows, too: it lies in the shadow map itself. Both are dark, so that the tone
-    curve is straight.
+    The edge lies 2 m above the floor along a ray. A solid casts a shadow too: it lies in the shadow
+    map itself. Plate and floor are dark, so that the tone curve is straight.
     """
     plate = '<geom type="box" size=".5 .5 .01" pos="-1.4 0 1.4"/>'
     size = (640, 480)
@@ -87,7 +87,7 @@ def test_penumbras_have_neither_noise_nor_hatching(gl):
 
 @pytest.mark.parametrize("below", [FLOOR, SLAB], ids=["floor", "solid"])
 def test_shadows_have_the_resolution_of_the_frame(gl, below):
-    """Across the edge of a plate's shadow, pixels differ as much from the one before as from the one behind."""
+    """Across a shadow's edge, brightness changes evenly from pixel to pixel."""
     plate = '<geom type="box" size=".9 .5 .01" pos="-1.4 0 1.4"/>'
     rows = frame_of(gl, below + plate + SUN.format(1.0, "true"), size=(320, 240))[
         40:120, 150:170, 1
@@ -97,7 +97,7 @@ def test_shadows_have_the_resolution_of_the_frame(gl, below):
 
 
 def test_a_wide_penumbra_has_no_steps(gl):
-    """Between light and shadow of a ball on the studio's floor brightness bends little over any eight pixels."""
+    """Brightness across a ball's soft shadow bends little over any eight pixels."""
     floor = frame_of(gl, FLOOR + BALL, size=(640, 480))[160:320, 400:570].mean(axis=2)
     for each in (floor, floor.T):
         assert np.abs(each[8:] - 2 * each[4:-4] + each[:-8]).max() < 9
@@ -128,7 +128,7 @@ def test_shadows_on_translucent_things_are_softer(gl):
 
 
 def test_a_shadow_on_the_floor_has_the_size_that_geometry_gives_it(gl):
-    """Under 45 degrees, in a wide scene of coarse maps: half of the light arrives below the edge of a plate."""
+    """At 45 degrees in a wide scene with coarse maps, half of the light is below the edge."""
     plate = '<geom type="box" size=".5 .5 .01" pos="-1.4 0 1.4"/>'
     far = "".join(f'<geom type="sphere" size=".1" pos="0 {y} .1"/>' for y in (-9, 9))
     size = (320, 240)
@@ -187,7 +187,7 @@ def test_a_transparent_geom_takes_its_opacity_of_the_light(gl, opacity):
 
 
 def test_a_body_under_glass_keeps_its_shadow(gl):
-    """A small plate under a large pane: its shadow is as dark as without the pane, the pane's lighter about it."""
+    """A plate under a pane has the shadow it has without the pane; the pane's is lighter."""
     body = (
         DARK_FLOOR
         + '<geom type="box" size=".1 .3 .01" pos="-.2 0 .4" rgba=".5 .5 .5 1"/>'

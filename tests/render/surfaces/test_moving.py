@@ -113,7 +113,8 @@ def test_two_sides_of_a_thin_plate_stay_apart():
 
 def test_a_frame_shows_a_dent_darker_than_with_the_light_at_rest(monkeypatch):
     model, data = posed(
-        """<mujoco><worldbody><light pos="0 3 0" dir="0 -1 0"/><geom name="target" type="sphere" size=".2"
+        """<mujoco><worldbody><light pos="0 3 0" dir="0 -1 0"/>
+        <geom name="target" type="sphere" size=".2"
         rgba=".2 .3 .5 1"/></worldbody></mujoco>"""
     )
     ripples = Ripples(model, {"target": Material(speed=1.0, density=1.0)}, resolution=8)
@@ -162,7 +163,8 @@ def test_gradients_are_those_on_the_moved_surface():
 @pytest.mark.parametrize("resolution", [8, 40])
 def test_a_frame_shows_the_surface_where_it_is(resolution):
     model, data = posed(
-        """<mujoco><worldbody><light pos="0 0 3"/><geom name="target" type="sphere" size=".2" rgba="1 0 0 1"/>
+        """<mujoco><worldbody><light pos="0 0 3"/>
+        <geom name="target" type="sphere" size=".2" rgba="1 0 0 1"/>
         </worldbody></mujoco>"""
     )
     ripples = Ripples(model, {"target": Material(speed=1.0, density=1.0)}, resolution=resolution)

@@ -182,9 +182,11 @@ def test_a_long_geom_is_as_near_as_its_nearest_point(gl, resources):
 
 GEOM = mujoco.mjtObj.mjOBJ_GEOM
 FLEX = mujoco.mjtObj.mjOBJ_FLEX
-TENDON = """<body name="a" pos="0 0 .5"><joint type="slide"/><geom size=".02"/><site name="s" euler="180 0 0"/></body>
+TENDON = """<body name="a" pos="0 0 .5"><joint type="slide"/><geom size=".02"/>
+<site name="s" euler="180 0 0"/></body>
 <site name="w" pos=".6 0 .5"/>"""
-SHEET = """<flexcomp name="f" type="grid" count="3 3 1" spacing=".2 .2 .1" dim="2" pos="0 0 .5" rgba="1 0 0 1">
+SHEET = """<flexcomp name="f" type="grid" count="3 3 1" spacing=".2 .2 .1" dim="2" pos="0 0 .5"
+  rgba="1 0 0 1">
 <edge equality="true"/></flexcomp>"""
 
 

@@ -1,4 +1,4 @@
-"""Backends by name, and against each other: feature by feature, on rims, irregular vertices and several parts."""
+"""Backends by name, and against each other on every feature and kind of surface."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -64,7 +64,7 @@ FEATURES: dict[str, Callable[[Atlas], Material]] = {
 
 
 def struck(atlas: Atlas, material: Material, backend: str) -> list[np.ndarray]:
-    """Height, velocity and dent after an impulse, a held force and pressure, and a velocity and a height added."""
+    """Height, velocity and dent after impulses, forces, pressure, velocity and height."""
     waves = WaveSolver(atlas, material, backend=backend)
     dt = waves.stable_timestep
     waves.add_impulse([0.2, -1.0, 0.1], 0.1, 0.3)
@@ -171,7 +171,7 @@ def test_an_unknown_backend_is_named_beside_the_valid_ones(
     operator: WaveOperator, name: str
 ) -> None:
     with pytest.raises(
-        SolverError, match=f"backend '{name}' does not exist; valid are 'auto', 'gl', 'cpu'"
+        SolverError, match=f"backend must be one of 'auto', 'gl', 'cpu', got '{name}'"
     ):
         make_backend(name, operator)
 

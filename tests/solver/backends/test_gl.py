@@ -1,4 +1,4 @@
-"""Storage buffers, compute shaders and the stiffness of moved vertices on the GPU, against numpy and the CPU."""
+"""Buffers, compute shaders and moved stiffness on the GPU against numpy and the CPU."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The OpenGL context: what it frees, its devices, drivers and sources, and how it says what went wrong."""
+"""The OpenGL context: freed objects, devices, drivers, sources and messages."""
 
 import gc
 import os
@@ -224,7 +224,8 @@ def drawing_threads(**environment: str) -> int:
         from pathlib import Path
         from ripple_sim.solver.gl import shared_context
         print(shared_context().renderer)
-        print(sum(comm.read_text().startswith("llvmpipe-") for comm in Path("/proc/self/task").glob("*/comm")))
+        names = [comm.read_text() for comm in Path("/proc/self/task").glob("*/comm")]
+        print(sum(name.startswith("llvmpipe-") for name in names))
     """
     usual = {name: value for name, value in os.environ.items() if name != "LP_NUM_THREADS"}
     done = ended("-c", textwrap.dedent(script), env=usual | environment, timeout=300, check=True)
@@ -410,7 +411,7 @@ def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(
 def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full_or_not_ours(
     free, ours, expected, monkeypatch
 ) -> None:
-    """Its cache is mapped into memory: a page for which the disk has no room ends the process by a bus error."""
+    """A page of the memory-mapped cache without room on the disk is a bus error."""
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=free))
     monkeypatch.setattr("os.access", lambda *_: ours)
     monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)

@@ -87,7 +87,7 @@ def test_our_context_is_left_even_where_an_interrupted_entry_left_it_current(ope
 
 
 def test_somebody_who_takes_the_context_away_while_it_draws_is_reported(opengl: None) -> None:
-    """As MuJoCo does, whose renderers release all that their thread has, whenever they are collected."""
+    """MuJoCo's renderers release the thread's context whenever they are collected."""
     with (
         pytest.raises(GLError, match=r"was left while it drew.*Close other renderers"),
         shared_context(),

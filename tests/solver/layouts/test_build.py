@@ -1,4 +1,4 @@
-"""Atlases are built, saved, loaded and cached; every texel lies on the surface, of hard shapes too."""
+"""Atlases are built, saved, loaded and cached; texels lie on the surface."""
 
 import sys
 import time
@@ -110,7 +110,7 @@ EXAMPLES = settings(
 
 
 def revolved(height: np.ndarray, radius: np.ndarray, around: int) -> tuple[np.ndarray, np.ndarray]:
-    """Surface of revolution about the z axis with `around` sides, closed by a vertex at both ends."""
+    """Surface of revolution about z with `around` sides and a vertex at each end."""
     n = len(height)
     angle = 2 * np.pi / around * np.arange(around)
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)

@@ -1,4 +1,4 @@
-"""Where no layout is named round bodies get the cube and limbed ones patches, by the sphere map alone."""
+"""The default layout is the cube for round bodies and patches for limbed ones."""
 
 from pathlib import Path
 

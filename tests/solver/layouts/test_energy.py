@@ -1,4 +1,4 @@
-"""The energy of maps and of a vertex's star against singular values, its derivatives against differences."""
+"""The energy of maps against singular values, its derivatives against differences."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""PLY files: text and binary, lists of any length, texture coordinates, polygons, and files that end early."""
+"""PLY files: text, binary, lists, texture coordinates, polygons, cut files."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Volumes from files: the same ball from NumPy, NIfTI, NRRD and a DICOM series, wherever and however its grid lies."""
+"""The same ball from volumes in NumPy, NIfTI, NRRD and DICOM, however the grid lies."""
 
 import sys
 from pathlib import Path
@@ -100,12 +100,12 @@ def test_what_is_no_volume_is_refused_with_what_is_valid(
     (tmp_path / "empty").mkdir()
     for name, spacing, message in [
         ("absent.nii", None, "does not exist"),
-        ("mesh.obj", None, "unknown ending; valid are .npy, .nii"),
+        ("mesh.obj", None, "unknown ending: it must end in .npy, .nii"),
         ("plain.npy", None, "needs a spacing"),
         ("broken.nii", 0.1, "a spacing of its own"),
         ("broken.nii", None, "cannot be read"),
         ("broken.npy", 0.1, "cannot be read"),
-        ("words.npy", 0.1, "holds no numbers"),
+        ("words.npy", 0.1, "must hold an array of numbers"),
         ("empty", None, "holds no DICOM series"),
     ]:
         with pytest.raises(MeshError, match=message):

@@ -113,7 +113,7 @@ def test_units_and_place_do_not_matter() -> None:
 
 @pytest.mark.parametrize("offset", [0.0, 0.003, 0.5, float("nan")])
 def test_an_offset_out_of_range_is_refused(offset: float) -> None:
-    with pytest.raises(MeshError, match=rf"{offset}; valid is 0\.004 to 0\.2"):
+    with pytest.raises(MeshError, match=rf"must be 0\.004 to 0\.2 .*, got {offset}"):
         wrap(Mesh.from_arrays(*cube()), offset)
 
 

@@ -1,4 +1,4 @@
-"""Operators by name, the baselines and softened needles; rims of open surfaces, against modes that are known."""
+"""Operators by name, baselines, softened needles; rims against known modes."""
 
 import dataclasses
 
@@ -251,6 +251,6 @@ def test_a_closed_surface_knows_no_rim_and_a_bad_name_is_refused() -> None:
         waves.step(0.2)
         heights.append(waves.height)
     np.testing.assert_array_equal(*heights)
-    message = "rim 'bent' does not exist; valid are 'free', 'supported', 'clamped', 'fixed'"
+    message = "rim must be one of 'free', 'supported', 'clamped', 'fixed', got 'bent'"
     with pytest.raises(SolverError, match=message):
         WaveSolver(atlas, backend="cpu", rim="bent")

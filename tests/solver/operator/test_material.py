@@ -131,15 +131,15 @@ def test_dent_stays_when_the_waves_have_died(animal: Atlas) -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Material.plate(modulus=-1.0), "modulus is -1.0 Pa"),
-        (lambda: Material.plate(poisson=0.7), "poisson is 0.7"),
-        (lambda: Material.jelly(thickness=0.0), "thickness is 0.0 m"),
+        (lambda: Material.plate(modulus=-1.0), "modulus must be .*, got -1.0 Pa"),
+        (lambda: Material.plate(poisson=0.7), "poisson must be .*, got 0.7"),
+        (lambda: Material.jelly(thickness=0.0), "thickness must be .*, got 0.0 m"),
         (
             lambda: Material.layer(1.0, thickness=[]),
-            r"thickness is \[\] m; valid is .* or one at every texel",
+            r"thickness must be .* at every texel, got \[\] m",
         ),
-        (lambda: Material.membrane(tension=np.inf), "tension is inf N/m"),
-        (lambda: Material.dent(0.0), "yield_height is 0 m"),
+        (lambda: Material.membrane(tension=np.inf), "tension must be .*, got inf N/m"),
+        (lambda: Material.dent(0.0), "yield_height must be .*, got 0 m"),
         (lambda: Material(viscosity=np.zeros((6, 4, 5))), "shape"),
     ],
 )

@@ -64,10 +64,10 @@ def test_a_body_and_its_impulse_are_the_same_hit_unless_it_is_too_heavy_to_rest(
 @pytest.mark.parametrize(
     ("size", "hit", "message"),
     [
-        (0.0, 1.0, "size is 0.0 m"),
-        (1.0, -1.0, "hit is -1.0 N s"),
-        (1.0, (1.0, np.inf), "speed of the hit is inf m/s"),
-        (1.0, (1.0, 2.0, 3.0), "valid is an impulse"),
+        (0.0, 1.0, "size must be .*, got 0.0 m"),
+        (1.0, -1.0, "hit must be .*, got -1.0 N s"),
+        (1.0, (1.0, np.inf), "speed of the hit must be .*, got inf m/s"),
+        (1.0, (1.0, 2.0, 3.0), "must be an impulse"),
     ],
 )
 def test_what_is_no_size_and_no_hit_is_refused(size: float, hit: object, message: str) -> None:

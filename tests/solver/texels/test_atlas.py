@@ -1,4 +1,4 @@
-"""The atlas locates points, also where charts meet; arrays come back from a file, or the damage is named."""
+"""The atlas locates points, also where charts meet; files round-trip, or name the damage."""
 
 import copy
 import itertools
@@ -21,7 +21,7 @@ DIAGONALS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) i
 
 
 def assert_touching(chart, row, column, n: int) -> None:
-    """Places of the directions to the cube's corners, edges and faces: in a chart that touches them, on its border."""
+    """Places of the cube's corners, edges and faces, on the border of a chart that has them."""
     on = DIAGONALS[np.arange(26), chart // 2]
     np.testing.assert_array_equal(on, 1 - 2 * (chart % 2))
     offset = np.abs(np.stack([row, column]) - (n - 1) / 2)

@@ -1,4 +1,4 @@
-"""Chart maps: texture coordinates, maps linear in each triangle, and the nearest places of compiled code."""
+"""Chart maps: texture coordinates, linear maps in triangles, and nearest places."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Links as long as the way over the facets: folded paper is as long as flat paper, and carries the same waves.
+"""Links are as long as the path over the facets: folded paper carries flat waves.
 
 A regular tetrahedron is a folded torus, half of it: its eigenvalues are known, whatever its edges.
 """
@@ -27,7 +27,7 @@ ENDS = np.array([(0, 1), (2, 3), (0, 2), (1, 3), (0, 3), (1, 2)])
 
 
 def paper(rng: np.random.Generator) -> tuple[Mesh, np.ndarray]:
-    """A sheet folded along lines at random angles, as mountains and valleys; and its places when flat [n, 2]."""
+    """A sheet folded at random angles into mountains and valleys, and its flat places [n, 2]."""
     cuts = np.sort(rng.uniform(0, 1, 9))
     x = np.concatenate([[0], cuts, [1]])
     angle = np.cumsum(rng.uniform(-1.2, 1.2, len(x) - 1))
@@ -49,7 +49,7 @@ def paper(rng: np.random.Generator) -> tuple[Mesh, np.ndarray]:
 
 
 def lengths(atlas: Atlas, places: np.ndarray) -> np.ndarray:
-    """Of all links between texels at places [C, n, n, d], straight, [4, C, n + 1, n + 1]; 0 where there is none."""
+    """Straight lengths of all links between places [C, n, n, d]; 0 where no link is."""
     around = atlas.texels.topology.with_halo(places)
     found = []
     for link, (a, b) in enumerate(LINK_ENDS):
@@ -109,7 +109,7 @@ def tetrahedron() -> Mesh:
 
 
 def tetrahedron_errors(atlas: Atlas) -> np.ndarray:
-    """Relative errors of the eigenvalues 2 to 20: waves on a torus of twice its edges, the even half of them."""
+    """Relative errors of the eigenvalues 2 to 20: the even half of waves on a torus."""
     m, n = np.meshgrid(np.arange(-6, 7), np.arange(-6, 7))
     exact = 4 * np.pi**2 / 3 * np.sort((m**2 + m * n + n**2).ravel())[1::2][:19]
     stiffness = stiffness_matrix(atlas.texels.stencil(np.ones(atlas.areas.shape)))

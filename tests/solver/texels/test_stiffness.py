@@ -1,4 +1,4 @@
-"""The stiffness of texel meshes, at rest and moving: the laws of its cells, and assembly by brute force."""
+"""The stiffness of texel meshes, at rest and moving: cells and brute-force assembly."""
 
 import numpy as np
 import pytest
@@ -106,7 +106,7 @@ def element(corners: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def hourglass_stiffness(diagonals: np.ndarray, area: float) -> float:
-    """What waves in time ask for, but no more than a share of what the time step allows, or a square's."""
+    """The limit that waves in time need, but no more than the time step allows."""
     first = (diagonals[0] - diagonals[1]) / 2
     second = (diagonals[0] + diagonals[1]) / 2
     long = max(first @ first, second @ second)
@@ -117,7 +117,7 @@ def hourglass_stiffness(diagonals: np.ndarray, area: float) -> float:
 
 
 def cell_by_cell(texels: TexelMesh, k: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Stiffness matrix and areas of a mesh without rims: each cell once, by the texels at its corners."""
+    """Stiffness matrix and areas of a mesh without rims, by loops over cells and corners."""
     topology = texels.topology
     around = texels.halo_positions
     k = k.ravel()

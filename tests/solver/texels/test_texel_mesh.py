@@ -1,4 +1,4 @@
-"""Texel meshes of any topology: what is known of their waves, their figures of merit, and smoothing on them."""
+"""Texel meshes of any topology: waves, figures of merit, and smoothing."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Thickness, of solids and of the layer over what lies inside, and medial radii, where they are known."""
+"""Thickness of solids and layers, and medial radii, against closed forms."""
 
 import numpy as np
 import pytest
@@ -87,7 +87,7 @@ def test_rays_that_miss_get_the_greatest_thickness_and_a_warning() -> None:
     atlas = sphere_atlas(1.0, 48)
     centre = (0.0, 0.0, 0.35)
     small = ball(centre, 0.2)
-    with pytest.warns(RippleWarning, match="have nothing below them") as told:
+    with pytest.warns(RippleWarning, match="have no inner body below them") as told:
         thickness = thickness_map(atlas, small)
     assert told[0].filename == __file__
     below = atlas.positions[..., 2] < -0.5
@@ -102,7 +102,7 @@ def test_what_comes_out_of_the_surface_leaves_no_layer() -> None:
     large = Mesh.from_arrays(
         *polygonise(sphere((0.0, 0.0, 0.6), 0.6), ((-0.8, -0.8, -0.2), (0.8, 0.8, 1.4)), 0.05)
     )
-    with pytest.warns(RippleWarning, match="comes out of the surface") as told:
+    with pytest.warns(RippleWarning, match="reaches out of the surface") as told:
         thickness = thickness_map(atlas, large)
     assert told[0].filename == __file__
     assert np.median(thickness[atlas.positions[..., 2] > 0.95]) < 1e-3
@@ -110,12 +110,12 @@ def test_what_comes_out_of_the_surface_leaves_no_layer() -> None:
 
 def test_bodies_that_are_not_inside_and_volumes_without_one_are_refused() -> None:
     atlas = sphere_atlas(1.0, 8)
-    with pytest.raises(AtlasError, match="met by no ray"):
+    with pytest.raises(AtlasError, match="no ray from the surface"):
         thickness_map(atlas, [])
     far = ball((0, 0, 0), 0.2)
-    with pytest.raises(AtlasError, match="met by no ray"):
+    with pytest.raises(AtlasError, match="no ray from the surface"):
         thickness_map(atlas, Mesh.from_arrays(far.V + 9.0, far.F))
-    with pytest.raises(MeshError, match="a threshold between, not 2"):
+    with pytest.raises(MeshError, match=r"threshold must lie between .*, got 2"):
         thickness_map(atlas, Volume(np.random.default_rng(0).random((4, 4, 4)), threshold=2.0))
     with pytest.raises(MeshError, match=r"shape \(4, 4\)"):
         Volume(np.zeros((4, 4)), threshold=0.5).surface()

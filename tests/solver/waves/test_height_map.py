@@ -1,4 +1,4 @@
-"""The height map: second-order gradients, continuous over edges and corners, the same on the GPU; its limit."""
+"""The height map: second-order gradients, continuity, both backends; its limit."""
 
 from functools import partial
 
@@ -29,7 +29,7 @@ def test_gradient_converges_at_second_order_also_at_the_cubes_edges() -> None:
 
 
 def interpolated(height_map: np.ndarray, r: float, c: float) -> np.ndarray:
-    """Bilinear heights of all charts at a place of theirs [texels], which begins at 0 at the charts' border."""
+    """Bilinear heights of all charts at a place [texels] that begins at the border."""
     i = int(r + 0.5)
     j = int(c + 0.5)
     s = r + 0.5 - i
@@ -95,7 +95,7 @@ def on_device(gl: GLContext, heights: np.ndarray) -> DeviceField:
 
 
 def page_of(gl: GLContext, height_map: HeightMap, heights: np.ndarray) -> tuple[np.ndarray, float]:
-    """The charts [C, n + 2, n + 2, 4] that are in the second layer of a texture, and the largest height drawn."""
+    """The charts [C, n + 2, n + 2, 4] in a texture's second layer, and the largest height."""
     page = ChartPage(*heights.shape[:2])
     with gl as ctx:
         texture = ctx.texture_array((*page.size, 2), 4, dtype="f4")

@@ -1,4 +1,4 @@
-"""Solvers that are made and dropped leave nothing: memory, file descriptors and objects of OpenGL stay as many."""
+"""Solvers leave nothing behind: memory, file descriptors and OpenGL objects."""
 
 import gc
 from pathlib import Path

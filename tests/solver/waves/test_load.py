@@ -1,4 +1,4 @@
-"""Loads over one step, held forces and pressure: what they add up to, when they end; the footprint of a source."""
+"""Loads over a step, held forces and pressure: sums and ends; a source's footprint."""
 
 import numpy as np
 import pytest

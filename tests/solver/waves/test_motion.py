@@ -1,4 +1,4 @@
-"""Waves on surfaces that move: against an ordinary differential equation, rigid motion, mass, and folds."""
+"""Waves on moving surfaces: an ordinary equation, rigid motion, mass, and folds."""
 
 import copy
 import pickle
@@ -121,11 +121,11 @@ def test_vertices_that_do_not_fit_are_refused():
     waves = WaveSolver(ATLAS, Material(speed=1.0))
     with pytest.raises(SolverError, match=r"vertices have shape \(3, 3\); the mesh"):
         waves.move(np.zeros((3, 3)))
-    with pytest.raises(SolverError, match="1 numbers of the vertices are not finite"):
+    with pytest.raises(SolverError, match=r"vertices must be finite .*, got 1 numbers"):
         waves.move(np.where(np.arange(ATLAS.mesh.V.size).reshape(-1, 3) == 4, np.nan, ATLAS.mesh.V))
     with pytest.raises(SolverError, match="deep fluid"):
         WaveSolver(ATLAS, Material.water()).move(ATLAS.mesh.V)
-    with pytest.raises(SolverError, match="operator 'paper' cannot move"):
+    with pytest.raises(SolverError, match="must have the operator 'fem', got 'paper'"):
         WaveSolver(ATLAS, Material(speed=1.0), operator="paper").move(ATLAS.mesh.V)
-    with pytest.raises(SolverError, match="tightening is 9"):
+    with pytest.raises(SolverError, match=r"tightening must be .*, got 9"):
         Material(tightening=9.0)

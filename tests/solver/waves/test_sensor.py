@@ -1,4 +1,4 @@
-"""Sensors against closed forms: modes of a sphere and of a membrane, by frequency; both backends; times and blocks."""
+"""Sensors against closed forms of a sphere and a membrane; both backends; blocks."""
 
 import itertools
 
@@ -208,14 +208,14 @@ def test_the_filter_passes_a_third_of_the_rate_and_nothing_above_a_half() -> Non
     [
         (
             {"kind": "pressure"},
-            "sensor kind is 'pressure'; valid are 'acceleration', 'velocity', 'height', 'strain'",
+            "sensor kind must be one of 'acceleration', .*'height', 'strain', got 'pressure'",
         ),
-        ({"rate": 0}, "sensor rate is 0; valid is a finite number greater than 0"),
+        ({"rate": 0}, "sensor rate must be a finite number greater than 0.*, got 0"),
         (
             {"kind": "strain"},
-            "sensor thickness is None m; valid is a finite number greater than 0 for kind 'strain'",
+            "sensor thickness must be a finite number greater than 0 for .* 'strain'.*, got None",
         ),
-        ({"at": "tip"}, "sensor at 'tip': this surface knows no names; valid are points"),
+        ({"at": "tip"}, "sensor at 'tip': this surface knows no names; give points"),
     ],
 )
 def test_invalid_sensors_are_refused(arguments: dict, message: str) -> None:

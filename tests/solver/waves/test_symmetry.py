@@ -1,4 +1,4 @@
-"""Waves keep the symmetries of the cube on the analytic sphere, and run equally fast in all directions."""
+"""Waves keep the symmetries of the cube and run equally fast in all directions."""
 
 import numpy as np
 import pytest

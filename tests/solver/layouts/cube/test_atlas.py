@@ -1,4 +1,4 @@
-"""The atlas of a given sphere map: symmetric, covariant, and on the mesh; the analytic atlas of a sphere."""
+"""Atlases of given sphere maps: symmetric, covariant and on the mesh; the sphere's."""
 
 import itertools
 

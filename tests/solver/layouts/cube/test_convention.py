@@ -1,4 +1,4 @@
-"""The cube map's geometry: directions, neighbours across edges, symmetries, areas and texture coordinates."""
+"""The cube map: directions, neighbours, symmetries, areas and texture coordinates."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_the_halo_holds_the_nearest_texels_across_the_edges(n: int) -> None:
 
 @pytest.mark.parametrize("bad", [0, 3, 2.5, -8, 10_000])
 def test_invalid_resolution_is_named(bad: float) -> None:
-    with pytest.raises(AtlasError, match=r"valid is a whole number"):
+    with pytest.raises(AtlasError, match=r"resolution must be a whole number"):
         cube.check_resolution(bad)
 
 
@@ -75,7 +75,7 @@ def test_limbs_that_fall_between_the_texels_are_not_covered(animal: Atlas) -> No
 
 
 def ball(subdivisions: int, resolution: int) -> Atlas:
-    """A turned icosphere, so that its triangles cross the cube's edges anyhow, mapped onto itself."""
+    """A turned icosphere mapped onto itself; its triangles cross the cube's edges."""
     solid = trimesh.creation.icosphere(subdivisions=subdivisions)
     turned = solid.vertices @ trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])[:3, :3].T
     mesh = Mesh.from_arrays(turned, solid.faces)
@@ -89,7 +89,7 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def direction_at(chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """The direction that a place in a chart stands for, by the definition of the equiangular cube map."""
+    """The direction of a chart point, by the definition of the equiangular cube map."""
     a, b = np.tan(np.pi / 4 * (2 * uv - 1)).T
     return unit(
         cube.CHART_NORMALS[chart]

@@ -1,4 +1,4 @@
-"""Atlases of the patch layout, of any surface, and their operator against eigenvalues that are known exactly."""
+"""Atlases of the patch layout of any surface; eigenvalues against exact ones."""
 
 from collections.abc import Callable
 
@@ -131,7 +131,7 @@ def test_auto_takes_patches_where_the_cube_does_not_fit() -> None:
 
 
 def test_unknown_layouts_are_refused() -> None:
-    with pytest.raises(AtlasError, match="valid are 'auto', 'cube', 'patches'"):
+    with pytest.raises(AtlasError, match="must be one of 'auto', 'cube', 'patches'"):
         build_atlas(sphere(1), 8, layout="hexagons")
 
 
@@ -142,7 +142,7 @@ def test_the_same_mesh_gives_the_same_atlas() -> None:
 
 
 def thick_graph(genus: int) -> Mesh:
-    """Bars of square section along a random graph on a cube's corners with that many cycles, its vertices shaken."""
+    """Bars along a random graph on a cube's corners with given cycles, vertices shaken."""
     rng = np.random.default_rng(genus)
     filled = np.zeros((5, 5, 5), bool)
     for ends in graph(genus, rng, size=2):

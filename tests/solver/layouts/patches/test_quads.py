@@ -1,4 +1,4 @@
-"""From cells to charts: sizes of cells, their quads, and the maps onto these, which stay one to one."""
+"""From cells to charts: sizes, quads, and maps that stay one to one."""
 
 import itertools
 
@@ -104,7 +104,7 @@ def quads(name: str) -> Quads:
 
 
 def assert_one_to_one(seamless: SeamlessMap) -> np.ndarray:
-    """No triangle is folded, each chart is covered once, and every texel found; returns the places of corners."""
+    """Check that no triangle is folded, and each chart covered once; return the corners."""
     places = patches.corner_places(seamless)
     areas = patches.signed_areas(np.stack([places.real, places.imag], axis=-1))
     assert areas.min() > 0
@@ -178,7 +178,7 @@ def test_moved_tips_lower_the_energy_and_leave_the_map_one_to_one(quads: Quads) 
 
 
 def hull(points: int) -> tuple[tuple[np.ndarray, ...], int, np.ndarray]:
-    """Triangles of the convex hull of random points, their sides, and how many meet in each point."""
+    """Triangles of a random convex hull, their sides, and the valence of each point."""
     V = np.random.default_rng(points).normal(size=(points, 3))
     F = ConvexHull(V / np.linalg.norm(V, axis=1, keepdims=True)).simplices.astype(np.int64)
     pairs = [

@@ -1,4 +1,4 @@
-"""The certificate sees every fold; stretch is measured by area; the map is turned so that the cube lies well on it."""
+"""The certificate sees every fold; stretch by area; the best turn of the cube."""
 
 import numpy as np
 import pytest

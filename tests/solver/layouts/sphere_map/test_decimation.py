@@ -1,4 +1,4 @@
-"""Collapses down to a tetrahedron, and what they keep for as long as possible; half-edges, quadrics, and undoing."""
+"""Collapses to a tetrahedron and their limits; half-edges, quadrics, and undoing."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Levels of detail renumber what is left of a mesh; reference triangles carry its areas and its real shapes."""
+"""Levels of detail renumber a mesh; reference triangles keep areas and shapes."""
 
 import numpy as np
 import pytest

@@ -102,7 +102,7 @@ def smooth_radius(V, rng, roughness, waves=5):
 
 
 def split_edges(V, F, rng, share, slenderness):
-    """Put a vertex into a share of the triangles, a small fraction from one side: two of the three are slivers."""
+    """Put a vertex close to a side of some triangles, which makes two slivers of each."""
     chosen = np.flatnonzero(rng.random(len(F)) < share)
     weights = np.array([(1 - slenderness) / 2, (1 - slenderness) / 2, slenderness])
     middle = np.einsum("j,ijk->ik", weights, V[F[chosen]])
@@ -159,7 +159,7 @@ def test_thin_limbs_keep_their_texels(length, radius):
 @EXAMPLES
 @given(seed=SEEDS, power=st.floats(0, 4))
 def test_very_uneven_triangles(seed, power):
-    """Triangles a hundred times smaller on one side of the sphere than on the other give an even map."""
+    """A mesh with triangles a hundred times smaller on one side gets an even map."""
     V, F = icosphere(4)
     pole = np.random.default_rng(seed).standard_normal(3)
     pole /= np.linalg.norm(pole)
