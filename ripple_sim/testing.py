@@ -305,7 +305,7 @@ def _direction(waves: WaveSolver, direction: ArrayLike, name: str) -> NDArray[np
     (vector,) = check_points(direction)
     length = np.linalg.norm(vector)
     if length == 0:
-        raise RippleError(f"{name} is [0, 0, 0]; valid is a direction, such as [0, 0, 1]")
+        raise RippleError(f"{name} must be a direction, such as [0, 0, 1], got [0, 0, 0]")
     if isinstance(waves, TargetWaves):
         vector = waves.from_world(vector) - waves.from_world(np.zeros(3))
     return vector / np.linalg.norm(vector)

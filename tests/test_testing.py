@@ -1,4 +1,4 @@
-"""Frames, surfaces and assertions for tests of a user's own hold where they should, and fail where they should."""
+"""`ripple_sim.testing`: frames, surfaces and assertions for the tests of a user."""
 
 import copy
 import pickle
@@ -25,13 +25,14 @@ pytestmark = pytest.mark.filterwarnings("ignore:geom .target. collides as its co
 
 TURNED_MESH = (
     '<body name="base" pos="0.5 -0.3 1" euler="20 -30 70"><freejoint/>'
-    '<geom name="target" type="mesh" mesh="limbed" pos="0.1 0.2 0.3" euler="0 40 0" mass="3"/></body>'
+    '<geom name="target" type="mesh" mesh="limbed" pos="0.1 0.2 0.3" euler="0 40 0" mass="3"/>'
+    "</body>"
 )
 EGG = '<geom name="egg" type="ellipsoid" size="0.4 0.3 0.3" pos="0.1 -0.2 0.3" euler="0 0 30"/>'
 
 
 def in_the_world(model: mujoco.MjModel, data: mujoco.MjData, V: np.ndarray) -> np.ndarray:
-    """Vertices of a mesh file where the MJCF puts them: without the frame that MuJoCo chooses for the mesh."""
+    """Vertices of a mesh file in the world, without the frame that MuJoCo gives the mesh."""
     turn = np.zeros(9)
     mujoco.mju_euler2Quat(quaternion := np.zeros(4), np.radians([0.0, 40.0, 0.0]), "xyz")
     mujoco.mju_quat2Mat(turn, quaternion)
@@ -98,8 +99,10 @@ def test_surface_is_displaced_along_its_normals() -> None:
 def test_surface_of_a_soft_body_is_where_its_nodes_are() -> None:
     model = mujoco.MjModel.from_xml_string(
         """<mujoco><worldbody><geom type="plane" size="3 3 1"/>
-        <flexcomp name="jelly" type="grid" dim="3" count="3 3 3" spacing=".1 .1 .1" pos="0 0 1" mass="1"
-         radius="0.005"><contact selfcollide="none"/><edge equality="true"/></flexcomp></worldbody></mujoco>"""
+        <flexcomp name="jelly" type="grid" dim="3" count="3 3 3" spacing=".1 .1 .1" pos="0 0 1"
+          mass="1"
+         radius="0.005"><contact selfcollide="none"/><edge equality="true"/></flexcomp></worldbody>
+         </mujoco>"""
     )
     data = mujoco.MjData(model)
     ripples = Ripples(model, {"jelly": Material(density=10.0)}, resolution=8, backend="cpu")

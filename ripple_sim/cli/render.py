@@ -193,7 +193,8 @@ class _VideoCommand(_SceneCommand, VideoOptions):
     overlay: arguments.Overlay = None
     compare: arguments.Baseline = VideoOptions.compare
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
-    """Output file: .mp4, .webm, .gif or .webp, or a name without an ending for a folder of frames."""
+    """Output file: .mp4, .webm, .gif or .webp, or a name without an ending for a folder of
+    frames."""
     device: arguments.Device = VideoOptions.device
     renderer: Literal["gl", "cycles"] = "gl"
     """gl is the OpenGL renderer. cycles is Blender's path tracer (needs bpy), at seconds to minutes

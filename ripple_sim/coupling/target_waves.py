@@ -1,4 +1,4 @@
-"""`TargetWaves`: the waves of a target, with the way from the target's frame to the world and back."""
+"""`TargetWaves`: the waves of a target, and the transform between its frame and the world."""
 
 from __future__ import annotations
 
@@ -60,10 +60,10 @@ class Whereabouts:
 class TargetWaves(WaveSolver):
     """Waves of a target of `Ripples`: a `WaveSolver` that knows where its surface is in the world.
 
-    `atlas.positions`, `atlas.mesh.V` and the points of `add_impulse` are in the frame of the target.
-    This is the frame of the geom, which for a mesh is not that of its file: MuJoCo puts the frame
-    of a mesh at its centre of mass and along its principal axes of inertia. The frame of a flex or
-    a skin is the world.
+    `atlas.positions`, `atlas.mesh.V` and the points of `add_impulse` are in the frame of the
+    target. This is the frame of the geom, which for a mesh is not that of its file: MuJoCo puts the
+    frame of a mesh at its centre of mass and along its principal axes of inertia. The frame of a
+    flex or a skin is the world.
     """
 
     def __init__(

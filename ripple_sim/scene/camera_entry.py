@@ -57,8 +57,8 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     name: str | None = None
     """A camera of the MJCF; by default MuJoCo's free camera."""
     track: str | None = None
-    """A body to follow: the free camera moves along with its centre of mass, from which `lookat` then counts; a named
-    camera turns towards it."""
+    """A body to follow: the free camera moves along with its centre of mass, from which `lookat`
+    then counts; a named camera turns towards it."""
     lookat: Vector | None = None
     """Point that the free camera looks at [m]; by default the model's middle."""
     distance: float | None = None
@@ -70,17 +70,17 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     fovy: float = 45.0
     """Vertical field of view [degrees]."""
     orbit: float = 0.0
-    """Degrees per second by which the camera circles round the point that it looks at. A camera with a name needs a
-    body to circle: `track`, or a `target` in the MJCF."""
+    """Degrees per second by which the camera circles round the point that it looks at. A camera
+    with a name needs a body to circle: `track`, or a `target` in the MJCF."""
     shutter: float = 0.0
-    """Shutter angle [degrees]: 360 leaves the shutter open from one frame to the next, 180, usual in film, half of that
-    time."""
+    """Shutter angle [degrees]: 360 leaves the shutter open from one frame to the next, 180, usual
+    in film, half of that time."""
     aperture: float = 0.0
-    """Diameter of the lens [m]; 0: all is sharp. An f-number would need a focal length, which MuJoCo's cameras do not
-    have."""
+    """Diameter of the lens [m]; 0: all is sharp. An f-number would need a focal length, which
+    MuJoCo's cameras do not have."""
     focus: float | str | Vector | None = None
-    """What stays sharp: a distance along the camera's axis [m], the name of a body or a geom, or a point in the world
-    [m]; by default the point that the camera looks at."""
+    """What stays sharp: a distance along the camera's axis [m], the name of a body or a geom, or a
+    point in the world [m]; by default the point that the camera looks at."""
     exposures: int = 32
     """Images of which a frame is the mean where `shutter` or `aperture` is not 0; at most 1024."""
     key: list[CameraKey] = []
@@ -88,7 +88,7 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
 
 
 def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
-    """Raise `SceneError` if a camera does not suit the model, or an optic or a path is impossible."""
+    """Raise `SceneError` for a camera that does not fit the model, or impossible optics or paths."""
     body = mujoco.mjtObj.mjOBJ_BODY
     geom = mujoco.mjtObj.mjOBJ_GEOM
     if entry.name is not None and not _exists(model, mujoco.mjtObj.mjOBJ_CAMERA, entry.name):
@@ -162,7 +162,7 @@ def _check_optics(entry: CameraEntry) -> None:
 
 
 def _refuse(name: str, value: object, valid: str) -> typing.NoReturn:
-    raise SceneError(f"the camera's {name} is {value!r}; valid is {valid}")
+    raise SceneError(f"the camera's {name} must be {valid}, got {value!r}")
 
 
 def _exists(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:

@@ -103,7 +103,8 @@ class VideoOptions(SceneOptions):
     resume: bool = False
     """Continue an interrupted render of the same scene with the same options."""
     device: int | None = None
-    """Number of the EGL device to render on. By default the device in MUJOCO_EGL_DEVICE_ID, if it is set."""
+    """Number of the EGL device to render on. By default the device in MUJOCO_EGL_DEVICE_ID, if it
+    is set."""
 
     def __post_init__(self) -> None:
         check_fields(

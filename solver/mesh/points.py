@@ -18,13 +18,12 @@ def check_points(points: ArrayLike) -> NDArray[np.float64]:
         array = np.asarray(points, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise AtlasError(
-            f"points are {shown(points)}; valid are numbers of shape [3] or [k, 3], in metres"
+            f"points must be numbers of shape [3] or [k, 3], in metres, got {shown(points)}"
         ) from error
     if array.ndim == 0 or array.shape[-1] != 3 or array.ndim > 2:
-        raise AtlasError(f"points have shape {array.shape}; valid is [3] or [k, 3], in metres")
+        raise AtlasError(f"points must have shape [3] or [k, 3], in metres, got {array.shape}")
     if not (np.abs(array) < _FARTHEST).all():
         raise AtlasError(
-            f"points hold NaN or numbers beyond {_FARTHEST:g}; valid are finite coordinates in "
-            "metres"
+            f"points must be finite coordinates in metres, got NaN or numbers beyond {_FARTHEST:g}"
         )
     return np.ascontiguousarray(array.reshape(-1, 3))

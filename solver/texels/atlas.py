@@ -225,5 +225,5 @@ class Atlas:
 
     @functools.cached_property
     def closest_points(self) -> ClosestPoints:
-        """Find the nearest points of the mesh: `atlas.closest_points(points)`, see `ClosestPoints`."""
+        """Function that finds the nearest points of the mesh: `atlas.closest_points(points)`."""
         return ClosestPoints(self.mesh.V, self.mesh.F)

@@ -24,8 +24,8 @@ _SQUARED_LENGTH_TOLERANCE = 2e-3
 # Folds are counted once in this many computations of the stiffness: both take about as long.
 _FOLD_CHECK_INTERVAL = 8
 
-# Least area of a texel's moved parallelogram, as a share of the product of its squared sides: beside
-# a flat one gradients stay finite.
+# Least area of a texel's moved parallelogram, as a share of the product of its squared sides:
+# beside a flat one gradients stay finite.
 _MIN_SQUARED_SINE = 1e-6
 
 
@@ -83,7 +83,8 @@ class Motion:
             self._warned = True
             warn_caller(
                 f"{count} of {len(self._folds.F)} triangles of the moving surface are turned over "
-                "or without area; waves there are wrong: move the vertices less, or use a stiffer body"
+                "or without area; waves there are wrong: move the vertices less, or use a stiffer "
+                "body"
             )
         return self._now
 

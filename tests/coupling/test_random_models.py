@@ -75,7 +75,7 @@ class Hit:
         self.told = [text for text in told if "the waves on geom" not in text]
 
     def _look_at_place(self, data: mujoco.MjData, impulse: Impulse, kind: str) -> None:
-        """How far from the true surface an impulse lies, over its size, and whether it faces what it pushes away."""
+        """Distance of an impulse from the surface over its size, and whether it pushes apart."""
         waves = self.ripples[impulse.geom]
         atlas = waves.atlas
         rotation = data.geom(impulse.geom).xmat.reshape(3, 3)

@@ -86,9 +86,11 @@ def test_images_are_found_beside_the_scene_file_and_given_paths_stay() -> None:
 
 
 MODEL = mujoco.MjModel.from_xml_string(
-    """<mujoco><worldbody><camera name="eye" pos="0 -3 1"/><camera pos="0 -3 1"/><camera name="side" pos="3 0 1"/>
+    """<mujoco><worldbody><camera name="eye" pos="0 -3 1"/><camera pos="0 -3 1"/>
+    <camera name="side" pos="3 0 1"/>
     <camera name="follower" pos="3 1 1" mode="targetbody" target="stone"/>
-    <geom name="egg" size="0.1"/><body name="stone" pos="0 0 1"><geom name="pebble" size="0.05"/></body>
+    <geom name="egg" size="0.1"/><body name="stone" pos="0 0 1"><geom name="pebble" size="0.05"/>
+    </body>
     </worldbody></mujoco>"""
 )
 
