@@ -88,7 +88,7 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
 
 
 def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
-    """Raise `SceneError` for a camera that does not fit the model, or impossible optics or paths."""
+    """Raise `SceneError` for a camera that does not fit the model, and for impossible numbers."""
     body = mujoco.mjtObj.mjOBJ_BODY
     geom = mujoco.mjtObj.mjOBJ_GEOM
     if entry.name is not None and not _exists(model, mujoco.mjtObj.mjOBJ_CAMERA, entry.name):
