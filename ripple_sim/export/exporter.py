@@ -67,6 +67,9 @@ class Exporter:
         `DisplacementLimit`.
     chunk : int, optional
         Frames in each of the files of a long USD run, which lie in a folder NAME.chunks beside it.
+    replay : bool
+        Write a page that plays recorded heights. By default a page solves the waves itself
+        wherever it can, so that its surfaces can be poked.
     overwrite : bool
         Replace a file that ripple-sim has not made.
 
@@ -104,6 +107,7 @@ class Exporter:
         size: tuple[int, int] = (1280, 720),
         limit: bool = True,
         chunk: int | None = None,
+        replay: bool = False,
         overwrite: bool = False,
     ) -> None:
         model = own_model(model)
@@ -128,6 +132,7 @@ class Exporter:
             triangles=triangles,
             chunk=chunk or 0,
             output=Path(output),
+            replay=replay,
         )
         self._begin(source, output, overwrite)
 
@@ -378,4 +383,5 @@ def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -
         triangles=options.triangles,
         sensors={} if options.sound else simulation.sensors,
         signals=options.signals,
+        replay=options.replay,
     )

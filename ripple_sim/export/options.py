@@ -36,6 +36,8 @@ class ExportOptions(SceneOptions):
     """Write the samples of the scene's sensors, in place of impulses (.csv, .parquet)."""
     sound: bool = False
     """Write what is heard at the camera also where the scene has sensors (.wav)."""
+    replay: bool = False
+    """Write a page that plays recorded heights, and does not solve the waves itself (.html)."""
     chunk: int | None = None
     """Frames in each of the files of a long USD run, which lie in a folder NAME.chunks beside
     it."""

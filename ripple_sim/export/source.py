@@ -56,6 +56,8 @@ class Source:
         Of a scene, by name.
     signals : bool
         Whether a table is of their samples.
+    replay : bool
+        Whether a page plays recorded heights rather than solve the waves itself.
     """
 
     model: mujoco.MjModel
@@ -75,6 +77,7 @@ class Source:
     resume: bool = False
     sensors: Mapping[str, Sensor] = dataclasses.field(default_factory=dict)
     signals: bool = False
+    replay: bool = False
 
     def mesh(self, name: str) -> MovingMesh:
         """The surface of a target."""

@@ -99,6 +99,20 @@ class VolumeBalance:
         return ratios[self._parts].reshape(field.shape)
 
 
+def balanced_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
+    """Whether a pressure keeps the volume of each part while its waves run, [p].
+
+    The density varies, the part keeps its volume, and no clamp or uneven spring holds it.
+    """
+    kept = kept_parts(operator, conserve).copy()
+    if operator.density is None:
+        return np.zeros_like(kept)
+    parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
+    for part in np.flatnonzero(kept):
+        kept[part] = _floats_freely(operator, parts == part)
+    return kept
+
+
 # begins, texels, heights, velocities; see `volume_rate`
 VolumeRate: TypeAlias = tuple[Ints, Ints, Floats32, Floats32]
 
@@ -125,10 +139,7 @@ def volume_rate(
         return None
     parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
     count = int(parts.max()) + 1
-    kept = kept_parts(operator, conserve).copy()
-    for part in np.flatnonzero(kept):
-        own = parts == part
-        kept[part] = _floats_freely(operator, own)
+    kept = balanced_parts(operator, conserve)
     decay, span = damped_step(operator, dt)
     weight = operator.mass * operator.inverse_density
     inertia = np.bincount(parts.reshape(-1), (weight * span * operator.response).reshape(-1), count)

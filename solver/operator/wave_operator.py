@@ -164,23 +164,35 @@ class WaveOperator:
         return force
 
     @functools.cached_property
+    def rates(self) -> tuple[float, float, float]:
+        """Largest rates of links and springs [1/s^2], and of viscosity [1/s].
+
+        Where springs push away, as beside the rims of plates, the rate of the links includes them.
+        """
+        bound = self.stencil.fastest(self.mass)
+        if self.bending is not None:
+            bound += self.bending.fastest(self.mass)
+        springs = float(self.stiffness.max())
+        # plates have such springs beside rims, with links that outweigh them
+        if self.stiffness.min() < 0:
+            links = self._rate(self.elastic_force, bound + max(springs, 0.0))
+            springs = 0.0
+        else:
+            links = self._rate(self.link_force, bound)
+        viscous = 0.0
+        if self.viscosity_stencil is not None:
+            viscous = self._rate(self.viscosity_stencil, self.viscosity_stencil.fastest(self.mass))
+        return links, springs, viscous
+
+    @functools.cached_property
     def stable_timestep(self) -> float:
         """Largest stable step of the leapfrog scheme [s], from the operator's largest eigenvalues.
 
         A mode with omega^2 = lambda + k and viscous rate mu is stable if dt^2 omega^2 + 2 dt mu <=
         4. Infinite if nothing moves.
         """
-        bound = self.stencil.fastest(self.mass)
-        if self.bending is not None:
-            bound += self.bending.fastest(self.mass)
-        # plates have such springs beside rims, with links that outweigh them
-        if self.stiffness.min() < 0:
-            wave = self._rate(self.elastic_force, bound + max(self.stiffness.max(), 0.0))
-        else:
-            wave = self._lightened(self._rate(self.link_force, bound) + self.stiffness.max())
-        viscous = 0.0
-        if self.viscosity_stencil is not None:
-            viscous = self._rate(self.viscosity_stencil, self.viscosity_stencil.fastest(self.mass))
+        links, springs, viscous = self.rates
+        wave = links if self.stiffness.min() < 0 else self._lightened(links + springs)
         # the positive root, written so that nothing cancels
         rate = viscous + np.sqrt(viscous**2 + 4 * wave)
         return np.inf if rate == 0 else float(SAFETY * 4 / rate)

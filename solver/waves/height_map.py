@@ -136,7 +136,7 @@ class HeightMapShaders:
         self._limit = limit
         self.shape = (*topology.halo.shape, 4)
         charts, n, _ = topology.shape
-        sources, means, ends = _tables(topology)
+        sources, means, ends = halo_sources(topology)
         self._place_count = sources.size
         self._corner_counts = (len(means), len(means) + len(ends))
         defines = {
@@ -221,7 +221,7 @@ class DeviceHeightMap:
         return height_map.astype(np.float32 if dtype is None else dtype, copy=False)
 
 
-def _tables(
+def halo_sources(
     topology: TexelTopology,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
     """The texel that each place of the charts with halo shows, and the corners that show none.

@@ -140,6 +140,8 @@ class HeldLoad:
         The forces that are held; assign to change them.
     balance : VolumeBalance
         Assign to change it.
+    backend : Backend
+        Assign to change it.
     """
 
     def __init__(
@@ -147,7 +149,7 @@ class HeldLoad:
     ) -> None:
         self.load = Load.none()
         self.balance = balance
-        self._backend = backend
+        self.backend = backend
         self._share = share
         self._uploaded = self.load
 
@@ -165,6 +167,10 @@ class HeldLoad:
     ) -> float | NDArray[np.float64]:
         """What balances momenta, or forces, on some texels, outwards, where volume is conserved."""
         return self.balance.counterpart(texels, momenta)
+
+    def upload_again(self) -> None:
+        """Hand the backend the load once more at the coming step, although it has the load."""
+        self._uploaded = Load(self._uploaded.texels, self._uploaded.forces)
 
     def upload(self, extra: Load | None) -> float | None:
         """Hand the backend the load of the coming step, unless it has the load already.
@@ -195,6 +201,6 @@ class HeldLoad:
                 f"the forces of a load must be finite, got forces that add up to {total!r} N"
             )
         acceleration = self.counterpart(once.texels, forces)
-        self._backend.hold(TexelLoad(once.texels, forces, acceleration))
+        self.backend.hold(TexelLoad(once.texels, forces, acceleration))
         self._uploaded = load
         return total

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import copy
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..backends.backend import Backend
 from ..backends.choice import make_backend
 from ..backends.crews import checked_threads
 from ..backends.gl_fields import DeviceField
@@ -16,7 +17,7 @@ from ..memory import require_memory
 from ..operator.assembly import build_operator
 from ..operator.material import Material, warn_of_wavelengths
 from ..operator.plate_rim import Rim
-from ..operator.volume import VolumeBalance, kept_parts
+from ..operator.volume import VolumeBalance, balanced_parts, kept_parts
 from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
 from .finite import FiniteGuard, as_field, check_kick, count_substeps, require_finite
@@ -24,6 +25,7 @@ from .footprint import Footprint, spread
 from .load import HeldLoad, Load, StepLoad, WaveState
 from .motion import Motion
 from .sensor import Listeners, Sensor
+from .tape import RecordedBackend, Tape
 
 # Memory that a solver takes for each texel while it is made, at least [bytes]; it keeps half of it.
 _TEXEL_BYTES = 300
@@ -240,6 +242,20 @@ class WaveSolver:
         sensor = Sensor(self.atlas, self.material, self.operator, at, kind, rate, thickness)
         return self.listeners.add(sensor, self.time)
 
+    def record(self, tape: Tape) -> None:
+        """Write everything that drives the waves from now on to a tape, until `forget`."""
+        if not isinstance(self._backend, RecordedBackend):
+            recorded = RecordedBackend(self._backend)
+            self._backend = self._held.backend = cast(Backend, recorded)
+        recorded = cast(RecordedBackend, self._backend)
+        recorded.tapes.append(tape)
+        self._held.upload_again()  # so that the tape begins with the load that is held
+
+    def forget(self, tape: Tape) -> None:
+        """End the recording to a tape."""
+        if isinstance(self._backend, RecordedBackend) and tape in self._backend.tapes:
+            self._backend.tapes.remove(tape)
+
     def move(self, V: ArrayLike) -> None:
         """Move the surface: the texels ride on their triangles, at their barycentric coordinates.
 
@@ -279,12 +295,22 @@ class WaveSolver:
 
         Assign True or False for all parts, or None for the default of each.
         """
-        return bool(kept_parts(self.operator, self._backend.keeps_volume).any())
+        return bool(self.kept_parts.any())
 
     @conserve_volume.setter
     def conserve_volume(self, value: bool | None) -> None:
         self._backend.keeps_volume = value
         self._held.balance = self._balance = VolumeBalance(self.operator, value)
+
+    @property
+    def kept_parts(self) -> NDArray[np.bool_]:
+        """Whether the mean of sources is removed, for each part of the surface, [p]."""
+        return kept_parts(self.operator, self._backend.keeps_volume)
+
+    @property
+    def balanced_parts(self) -> NDArray[np.bool_]:
+        """Whether a pressure keeps the volume of each part while its waves run, [p]."""
+        return balanced_parts(self.operator, self._backend.keeps_volume)
 
     @property
     def pressure(self) -> NDArray[np.float64]:
@@ -519,7 +545,9 @@ class WaveSolver:
         return field
 
     def _note(self, kind: str, field: NDArray) -> None:
-        """Tell the guard of a height or a velocity that was assigned or added."""
+        """Tell the guard, and tapes, of a height or a velocity that was assigned or added."""
+        if isinstance(self._backend, RecordedBackend):
+            self._backend.break_off("has heights or velocities that the program assigns")
         unit, time = ("m", self.operator.stable_timestep) if kind == "height" else ("m/s", 1.0)
         largest = float(np.abs(field).max())
         self._guard.note(kind, largest, unit, self.time, largest / time)

@@ -6,14 +6,20 @@ async function bytesOf(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// Takes typed arrays from bytes, one after the other.
+// Takes typed arrays from bytes, one after the other; `take.planes` those whose low bytes all come first, then the higher ones.
 function reader(bytes) {
   let at = 0;
-  return (Type, count) => {
+  const take = (Type, count) => {
     const size = count * Type.BYTES_PER_ELEMENT;
     at += size;
     return new Type(bytes.slice(at - size, at).buffer);
   };
+  take.planes = (Type, count) => {
+    const size = Type.BYTES_PER_ELEMENT, mixed = new Uint8Array(count * size);
+    for (let plane = 0; plane < size; plane++) for (let i = 0; i < count; i++) mixed[i * size + plane] = bytes[at++];
+    return new Type(mixed.buffer);
+  };
+  return take;
 }
 
 // Gives each part its points [m], directions, triangles F and texture coordinates of their corners.
@@ -58,6 +64,8 @@ class Frames {
 
   get tags() { return document.querySelectorAll("script.chunk"); }
 
+  get ended() { return Boolean(document.getElementById("end")); }
+
   async get(number) {
     const chunk = Math.floor(number / this.meta.chunk);
     if (!this.kept.has(chunk)) {
@@ -77,7 +85,7 @@ class Frames {
 
   async decoded(bytes) {
     const size = new DataView(bytes.buffer).getUint32(0, true);
-    const {poses, arrows, middles} = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
+    const {poses, arrows, middles, waves} = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
     let at = 4 + size;
     // Whole steps: those before and what was left after prediction, in three planes of bytes.
     const next = (before, parents) => {
@@ -91,10 +99,12 @@ class Frames {
       at += 3 * count;
       return now;
     };
-    let before = this.targets.map(part => new Int32Array(part.points));
+    // targets have their events, or else their heights in steps
+    let before = this.targets.map((part, k) => waves[k] ? null : new Int32Array(part.points));
     const frames = poses.map((pose, i) => {
-      before = before.map((last, k) => next(last, this.parents[k]));
-      return {pose, arrows: arrows[i], steps: before, vertices: []};
+      before = before.map((last, k) => last && next(last, this.parents[k]));
+      const events = this.targets.map((_, k) => waves[k] ? waves[k][i] : null);
+      return {pose, arrows: arrows[i], steps: before, events, vertices: []};
     });
     for (const [target, places] of Object.entries(middles)) {
       const {points, step, parents} = await this.motion(target);

@@ -72,11 +72,11 @@ function reachesOf(points, index) {
   return {points: Uint32Array.from(reaches.keys()), far: Float32Array.from(reaches.values())};
 }
 
-// Displaces a target from its rest by heights in steps [m]; normals are those of the triangles round a point, creases stay.
-function displace(part, {rest, directions}, steps, step, limit) {
+// Displaces a target from its rest by heights [m] of its points; `limit` is the height of the strongest colours; normals are those of the triangles round a point, creases stay.
+function displace(part, {rest, directions}, heights, limit) {
   const {F, source, data} = part, count = part.points;
   const points = new Float32Array(3 * count), normals = new Float32Array(3 * count);
-  for (let i = 0; i < count; i++) for (let k = 0; k < 3; k++) points[3 * i + k] = rest[3 * i + k] + steps[i] * step * directions[3 * i + k];
+  for (let i = 0; i < count; i++) for (let k = 0; k < 3; k++) points[3 * i + k] = rest[3 * i + k] + heights[i] * directions[3 * i + k];
   for (let t = 0; t < F.length; t += 3) {
     const a = 3 * F[t], b = 3 * F[t + 1], c = 3 * F[t + 2];
     const ux = points[b] - points[a], uy = points[b + 1] - points[a + 1], uz = points[b + 2] - points[a + 2];
@@ -87,7 +87,7 @@ function displace(part, {rest, directions}, steps, step, limit) {
   for (let i = 0; i < source.length; i++) {
     const p = 3 * source[i], size = Math.sqrt(normals[p] ** 2 + normals[p + 1] ** 2 + normals[p + 2] ** 2) || 1;
     for (let k = 0; k < 3; k++) { data[0][3 * i + k] = points[p + k]; data[1][3 * i + k] = normals[p + k] / size; }
-    data[3][i] = steps[source[i]] * step / limit;
+    data[3][i] = heights[source[i]] / limit;
   }
 }
 

@@ -1,7 +1,6 @@
-// The player: time, camera and controls. Tests and other pages may use `ripplePlayer`.
+// The player: the run in time, its waves, and the picture. Tests and other pages may use `ripplePlayer`.
 const ARROW_LENGTH = 0.25;  // of the strongest contact, in distances of the camera
-const RATE = 30, LATE = 1.1, COARSEST = 0.6;  // frames a second that it takes care to show, by how much they may be late before fewer pixels are drawn, and how few
-const REFRESH = 17;  // of the screen [ms]
+const COLOR_SHARE = 0.8;  // of the greatest height so far, which has the strongest colours
 
 function arrowPart() {
   const points = [], normals = [], F = [], sides = 10;
@@ -17,9 +16,11 @@ function arrowPart() {
 
 class Player {
   constructor(canvas) {
-    this.canvas = canvas; this.number = 0; this.playing = true; this.shown = 0; this.heat = false; this.contacts = false; this.detail = 1;
+    Object.assign(this, {canvas, number: 0, playing: true, shown: 0, heat: false, contacts: false, grid: false, detail: 1});
     this.orbit = null;  // azimuth and elevation [radians], distance and focus; null: the scene's camera
+    this.poked = false;
     this.meta = JSON.parse(document.getElementById("meta").textContent);
+    this.work = Promise.resolve();  // what goes through time, one after the other
   }
 
   async start() {
@@ -28,19 +29,61 @@ class Player {
     this.frames = new Frames(this.meta, this.targets);
     this.drawing = new Drawing(this.canvas, this.meta);
     await this.drawing.load();
-    this.limits = this.targets.map(() => 1);
+    this.surfaces = await Promise.all(this.targets.map(surfaceOf));
+    this.chooseSolvers();
+    this.timeline = new Timeline(this.frames, this.surfaces);
+    const least = 1e-4 * this.meta.distance;
+    this.limits = this.targets.map((_, i) => this.surfaces[i] ? least : this.meta.steps[i]);
     this.strongest = 1e-9;
     await this.show(0);
   }
 
-  // Draws a frame at once; returns when it is on the canvas.
-  async show(number) {
-    this.number = Math.max(0, Math.min(number, this.frames.count - 1));
-    this.frame = await this.frames.get(Math.floor(this.number));
+  // Whether the page solves the waves of any target.
+  get live() { return this.surfaces.some(Boolean); }
+
+  // Solves the waves as it is faster here, or by "loop" or "pass".
+  chooseSolvers(kind) {
+    const {gl, software} = this.drawing;
+    for (const surface of this.surfaces) {
+      if (!surface) continue;
+      const loop = kind === "loop" || !kind && software || passFault(gl, surface.law);
+      const solver = loop ? new WaveLoop(surface.law) : kind ? new WavePass(surface.law, gl) : fasterSolver(surface.law, gl);
+      if (solver) surface.use(solver);
+    }
+  }
+
+  // Draws a frame, or a moment between two, at once; returns when it is on the canvas.
+  show(number) {
+    this.work = this.work.then(async () => {
+      this.number = Math.max(0, Math.min(number, this.frames.count - 1));
+      await this.timeline.to(this.live ? this.number : Math.floor(this.number));
+      await this.paint();
+    });
+    return this.work;
+  }
+
+  // Goes on after the end of the run for a time [s of the film].
+  liveOn(seconds) {
+    this.work = this.work.then(async () => {
+      this.timeline.liveOn(seconds / this.meta.slowMotion);
+      await this.paint();
+    });
+    return this.work;
+  }
+
+  restart() {
+    this.work = this.work.then(() => this.timeline.restart());
+    return this.show(0);
+  }
+
+  // Draws the present state.
+  async paint() {
+    this.frame = await this.frames.get(this.timeline.frame);
+    this.next = this.timeline.frame + 1 < this.frames.count ? await this.frames.get(this.timeline.frame + 1) : this.frame;
     this.targets.forEach((part, i) => {
-      const steps = this.frame.steps[i], V = this.frame.vertices[i], step = this.meta.steps[i];
-      this.limits[i] = steps.reduce((most, step) => Math.max(most, Math.abs(step)), this.limits[i]);
-      displace(part, V ? this.frames.motions.get(String(i)).at(V) : part, steps, step, 0.8 * this.limits[i] * step);
+      const heights = this.heightsOf(i), V = this.frame.vertices[i];
+      this.limits[i] = heights.reduce((most, height) => Math.max(most, Math.abs(height)), this.limits[i]);
+      displace(part, V ? this.frames.motions.get(String(i)).at(V) : part, heights, COLOR_SHARE * this.limits[i]);
       this.drawing.upload(part);
     });
     this.onCanvas = Math.floor(this.number);
@@ -48,14 +91,40 @@ class Player {
     this.shown++;
   }
 
+  // Heights of a target's points [m]: the recorded ones, or those of its waves.
+  heightsOf(target) {
+    const steps = this.frame.steps[target], surface = this.surfaces[target];
+    if (steps) return Float32Array.from(steps, step => step * this.meta.steps[target]);
+    surface.settle();
+    return surface.pointHeights();
+  }
+
   redraw() {
-    if (!this.frame) return;
+    if (!this.frame || this.drawing.lost) return;
     const scale = (window.devicePixelRatio || 1) * (this.playing ? this.detail : 1);
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map(x => Math.max(1, Math.round(x * scale)));
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, {width, height});
-    const bodies = this.frame.pose.slice(1).map(row => placed(row.slice(0, 3), row.slice(3)));
-    this.drawing.draw(this.view(width / height), bodies, this.contacts ? this.arrows() : [], this.heat);
+    this.drawing.draw(this.view(width / height), this.bodies(), this.contacts ? this.arrows() : [], this.heat);
+    if (this.grid) this.drawGrids(width / height);
   }
+
+  drawGrids(aspect) {
+    const bodies = this.bodies(), {matrix} = this.view(aspect);
+    this.surfaces.forEach(surface => {
+      if (!surface) return;
+      surface.grid = surface.grid || new TexelGrid(this.drawing.gl, surface.law);
+      surface.grid.draw(times(matrix, times(bodies[surface.part.body], surface.part.local)), surface.solver.h);
+    });
+  }
+
+  // Position and quaternion of the camera and of the bodies, between two frames.
+  places() {
+    const share = this.timeline.share;
+    if (!share) return this.frame.pose;
+    return this.frame.pose.map((row, i) => between(row, this.next.pose[i], share));
+  }
+
+  bodies() { return this.places().slice(1).map(row => placed(row.slice(0, 3), row.slice(3))); }
 
   arrows() {
     for (const arrow of this.frame.arrows) this.strongest = Math.max(this.strongest, Math.abs(arrow[6]));
@@ -67,7 +136,7 @@ class Player {
   }
 
   view(aspect) {
-    const [camera] = this.frame.pose, m = placed(camera.slice(0, 3), camera.slice(3));
+    const [camera] = this.places(), m = placed(camera.slice(0, 3), camera.slice(3));
     let [right, up, back, eye] = [m.slice(0, 3), m.slice(4, 7), m.slice(8, 11), camera.slice(0, 3)];
     let distance = this.meta.distance, focus = add(eye, back, -distance);
     if (this.orbit) {
@@ -89,56 +158,36 @@ class Player {
     const {back, focus, distance} = this.view(1);
     this.orbit = {azimuth: Math.atan2(back[1], back[0]), elevation: Math.asin(Math.max(-1, Math.min(1, back[2]))), distance, focus};
   }
+
+  // The live surface at a place of the canvas, from -1 to 1 both, and the point in the frame of its geom; null beside them.
+  pick(x, y) {
+    const {eye, ray} = this.view(this.canvas.clientWidth / this.canvas.clientHeight), bodies = this.bodies();
+    const way = add(add(ray[0], ray[1], x), ray[2], y), live = this.targets.filter((_, i) => this.surfaces[i] && !this.frame.steps[i]);
+    const hit = touched(live, part => times(bodies[part.body], part.local), eye, way);
+    return hit && {surface: this.surfaces[this.targets.indexOf(hit.part)], point: hit.point};
+  }
+
+  // Presses a surface at a point with a multiple of its typical hit.
+  poke({surface, point}, strength) {
+    surface.press(pressedTexels(surface.law, point), strength * surface.pulse);
+    this.timeline.forget();
+    this.poked = true;
+  }
 }
 
-function control(player) {
-  const of = id => document.getElementById(id), slider = of("frame"), canvas = player.canvas;
-  const follow = () => { slider.max = player.frames.count - 1; slider.value = player.number; of("time").textContent = `${(player.number / player.meta.fps).toFixed(2)} s`; };
-  const play = on => { player.playing = on; player.redraw(); of("play").textContent = on ? "Pause" : "Play"; };
-  of("play").onclick = () => play(!player.playing);
-  slider.oninput = async () => { play(false); await player.show(Number(slider.value)); follow(); };
-  for (const id of ["heat", "contacts"]) of(id).onchange = event => { player[id] = event.target.checked; player.redraw(); };
-  of("camera").onclick = () => { player.orbit = null; player.redraw(); };
-  canvas.onpointerdown = event => canvas.setPointerCapture(event.pointerId);
-  canvas.onpointermove = event => {
-    if (!event.buttons) return;
-    player.free();
-    const orbit = player.orbit, step = 0.006;
-    if (event.shiftKey || event.buttons > 1) {
-      const {right, up} = player.view(1), scale = 1.5 * orbit.distance / canvas.clientHeight;
-      orbit.focus = add(add(orbit.focus, right, -scale * event.movementX), up, scale * event.movementY);
-    } else {
-      orbit.azimuth -= step * event.movementX;
-      orbit.elevation = Math.max(-1.55, Math.min(1.55, orbit.elevation + step * event.movementY));
-    }
-    player.redraw();
-  };
-  canvas.onwheel = event => { event.preventDefault(); player.free(); player.orbit.distance *= Math.exp(0.001 * event.deltaY); player.redraw(); };
-  document.onkeydown = event => { if (event.key === " ") { event.preventDefault(); play(!player.playing); } };
-  window.onresize = () => player.redraw();
-  let last = performance.now(), drawn = last, late = 1;
-  const tick = async now => {
-    const speed = Number(of("speed").value) * player.meta.fps, count = player.frames.count;
-    const next = player.number + (now - last) / 1000 * speed;
-    last = now;
-    if (player.playing) {
-      player.number = document.getElementById("end") && next >= count ? 0 : next;
-      // a frame that is on the canvas already is not drawn again
-      if (Math.floor(player.number) !== player.onCanvas) {
-        late += 0.03 * (Math.min((now - drawn) / Math.max(1000 / speed, 1000 / RATE), 3) - late);
-        if (late > LATE && player.detail > COARSEST) { player.detail *= 0.8; late = 1; }
-        drawn = now;
-        await player.show(player.number);
-        follow();
-      }
-    }
-    // where the next frame is far off, the browser may rest
-    const rest = 1000 * (1 - player.number % 1) / speed - REFRESH;
-    setTimeout(() => requestAnimationFrame(tick), player.playing ? Math.max(Math.min(rest, 100), 0) : 0);
-  };
-  follow();
-  requestAnimationFrame(tick);
+// The surface of a target whose law the page has, or null.
+async function surfaceOf(part, target) {
+  const script = document.querySelector(`script.law[data-target="${target}"]`);
+  if (!script) return null;
+  const meta = JSON.parse(script.textContent), surface = new Surface(part, lawOf(meta, await bytesOf(meta.arrays)));
+  const end = document.getElementById("end"), push = end ? JSON.parse(end.textContent).pushes[target] : 0;
+  surface.pulse = push || meta.pulse;
+  return surface;
 }
 
-const player = new Player(document.getElementById("view"));
-window.ripplePlayer = {player, ready: player.start().then(() => { control(player); return player; })};
+// Between two rows of a position and a quaternion.
+function between(row, next, share) {
+  const way = dot(row.slice(3), next.slice(3)) < 0 ? -1 : 1;
+  const mixed = row.map((x, i) => (1 - share) * x + share * next[i] * (i < 3 ? 1 : way));
+  return [...mixed.slice(0, 3), ...unit(mixed.slice(3))];
+}

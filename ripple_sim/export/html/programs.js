@@ -9,7 +9,7 @@ function drawsInSoftware() {
 // A program with what is defined, and `set`, which takes its uniforms by their names.
 function programOf(gl, vertex, fragment, defined = []) {
   const program = gl.createProgram();
-  const head = ["#version 300 es", ...defined.map(name => `#define ${name}`), "precision highp float;", "precision highp sampler2DShadow;"];
+  const head = ["#version 300 es", ...defined.map(name => `#define ${name}`), "precision highp float;", "precision highp int;", "precision highp sampler2DShadow;"];
   for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, head.join("\n") + source);
@@ -21,6 +21,9 @@ function programOf(gl, vertex, fragment, defined = []) {
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   return {program, set: settersOf(gl, program)};
 }
+
+// The source of a shader that the page has as a file.
+function shaderOf(name) { return document.getElementById(name).textContent; }
 
 function settersOf(gl, program) {
   const setters = {}, kinds = {[gl.FLOAT]: "uniform1fv", [gl.FLOAT_VEC2]: "uniform2fv", [gl.FLOAT_VEC3]: "uniform3fv", [gl.FLOAT_VEC4]: "uniform4fv"};

@@ -1,0 +1,206 @@
+// Buttons, keys, sliders and the pointer.
+const RATE = 30, LATE = 1.1, COARSEST = 0.6;  // frames a second that it takes care to show, by how much they may be late before fewer pixels are drawn, and how few
+const REFRESH = 17;  // of the screen [ms]
+const LONGEST_TICK = 0.1;  // of time that passes between two pictures [s]: after a rest, or where it is slow, time waits
+const DRAG_RATE = 12;  // pokes a second of a pointer that stays or moves
+const DRAG_SHARE = 0.35;  // of a click's impulse in each of them
+const TURN = 0.006;  // of the camera [radians a pixel]
+const LOG_RANGE = 2;  // a slider's ends multiply or divide by 4: two powers of 2
+
+function control(player) {
+  const of = id => document.getElementById(id);
+  const ui = {of, follow: () => follow(player, of)};
+  ui.play = on => {
+    player.playing = on;
+    player.redraw();
+    of("play").className = on ? "playing" : "";
+    of("play").setAttribute("aria-label", on ? "Pause" : "Play");
+  };
+  of("hint").hidden = !player.live;
+  buttons(player, ui);
+  sliders(player, of);
+  keys(player, ui);
+  pointer(player, ui);
+  window.onresize = () => player.redraw();
+  ui.follow();
+  clock(player, ui);
+}
+
+function follow(player, of) {
+  const slider = of("frame"), last = player.frames.count - 1, fps = player.meta.fps;
+  slider.max = last;
+  slider.value = player.number;
+  slider.hidden = last < 1;
+  of("time").textContent = last < 1 ? "" : `${(player.number / fps).toFixed(2)} s`;
+}
+
+function buttons(player, ui) {
+  const {of, play, follow} = ui;
+  of("play").onclick = () => play(!player.playing);
+  of("step").onclick = () => step(player, ui, 1);
+  of("restart").onclick = async () => { await player.restart(); play(true); follow(); };
+  let wanted = null;
+  of("frame").oninput = async () => {  // only the latest place, however fast it is dragged
+    play(false);
+    const idle = wanted === null;
+    wanted = Number(of("frame").value);
+    while (idle && wanted !== null) {
+      const number = wanted;
+      await player.show(number);
+      if (wanted === number) wanted = null;
+    }
+    if (idle) follow();
+  };
+  for (const id of ["heat", "contacts", "grid"]) of(id).onchange = event => { player[id] = event.target.checked; player.redraw(); };
+  of("camera").onclick = () => { player.orbit = null; player.redraw(); };
+  of("picture").onclick = () => savePicture(player);
+  of("full").onclick = () => document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
+  of("tune").onclick = () => {
+    of("panel").hidden = !of("panel").hidden;
+    of("tune").setAttribute("aria-expanded", String(!of("panel").hidden));
+  };
+}
+
+// One frame on or back; after the end, the time of one frame.
+async function step(player, ui, frames) {
+  ui.play(false);
+  const atEnd = player.live && frames > 0 && player.number >= player.frames.count - 1;
+  await (atEnd ? player.liveOn(1 / player.meta.fps) : player.show(Math.round(player.number) + frames));
+  ui.follow();
+}
+
+function savePicture(player) {
+  player.redraw();
+  const link = document.createElement("a");
+  link.href = player.canvas.toDataURL("image/png");
+  link.download = `${document.title || "ripples"}.png`;
+  link.click();
+}
+
+// The waves' sliders: powers of 2 about what the scene has.
+function sliders(player, of) {
+  const factor = id => 2 ** (LOG_RANGE * Number(of(id).value));
+  player.strength = () => factor("impulse");
+  of("waves").hidden = !player.live;
+  const change = () => {
+    for (const surface of player.surfaces) if (surface) surface.sliders = slidersOf(surface.law, factor("wave-speed"), Number(of("damping").value), factor("stiffness"));
+  };
+  for (const id of ["wave-speed", "damping", "stiffness"]) of(id).oninput = change;
+  of("plain").onclick = () => { for (const id of ["impulse", "wave-speed", "damping", "stiffness"]) of(id).value = 0; change(); };
+}
+
+// More damping: up to the rate that ends a wave on its way over the object; less: down to none.
+function slidersOf(law, speed, damping, stiffness) {
+  const {meta: {rates, size, resolution}} = law, mean = law.damping.reduce((sum, x) => sum + x, 0) / law.count;
+  const across = 0.4 * Math.sqrt(rates.links) * size / resolution / size * 4;  // [1/s]
+  return {speed, stiffness, damping: damping < 0 ? damping * mean : damping * (mean + across)};
+}
+
+function keys(player, ui) {
+  const {of} = ui, click = id => of(id).click();
+  const actions = {
+    " ": () => click("play"), ".": () => step(player, ui, 1), ",": () => step(player, ui, -1), r: () => click("restart"), h: () => click("heat"),
+    c: () => click("contacts"), g: () => click("grid"), f: () => click("full"), p: () => click("picture"), "0": () => click("camera"), t: () => click("tune"),
+  };
+  document.onkeydown = event => {
+    const action = actions[event.key.toLowerCase()];
+    const typing = event.target.matches("input[type=range], select") && event.key !== " ";
+    if (!action || typing || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    action();
+  };
+}
+
+// On a surface the pointer pokes it, beside it and with other buttons or two fingers it moves the camera.
+function pointer(player, ui) {
+  const canvas = player.canvas, down = new Map();
+  let dragged = null, latest = 0;
+  const place = ({clientX, clientY}) => {
+    const box = canvas.getBoundingClientRect();
+    return [2 * (clientX - box.left) / box.width - 1, 1 - 2 * (clientY - box.top) / box.height];
+  };
+  const press = share => {
+    const hit = dragged && player.pick(...dragged);
+    if (!hit) return false;
+    player.poke(hit, share * player.strength());
+    ui.of("hint").className = "gone";
+    latest = performance.now();
+    if (!player.playing) ui.play(true);
+    return true;
+  };
+  ui.dragging = now => { if (dragged && now - latest > 1000 / DRAG_RATE) press(DRAG_SHARE); };
+  canvas.onpointerdown = event => {
+    canvas.setPointerCapture(event.pointerId);
+    down.set(event.pointerId, event);
+    dragged = down.size === 1 && event.button === 0 && !event.shiftKey ? place(event) : null;
+    if (!press(1)) dragged = null;
+  };
+  canvas.onpointerup = canvas.onpointercancel = event => { down.delete(event.pointerId); dragged = null; };
+  canvas.onpointermove = event => {
+    if (dragged) dragged = place(event);
+    else if (down.has(event.pointerId)) moveCamera(player, down, event);
+    else canvas.style.cursor = player.frame && player.pick(...place(event)) ? "pointer" : "grab";
+    if (down.has(event.pointerId)) down.set(event.pointerId, event);
+  };
+  canvas.onwheel = event => { event.preventDefault(); player.free(); player.orbit.distance *= Math.exp(0.001 * event.deltaY); player.redraw(); };
+  canvas.oncontextmenu = event => event.preventDefault();
+}
+
+// Turns the camera, or shifts it with the shift key or another button; two fingers shift and zoom.
+function moveCamera(player, down, event) {
+  player.free();
+  const orbit = player.orbit, before = down.get(event.pointerId), share = 1 / down.size;
+  const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
+  if (event.shiftKey || event.buttons > 1 || down.size > 1) {
+    const {right, up} = player.view(1), scale = 1.5 * share * orbit.distance / player.canvas.clientHeight;
+    orbit.focus = add(add(orbit.focus, right, -scale * dx), up, scale * dy);
+  } else {
+    orbit.azimuth -= TURN * dx;
+    orbit.elevation = Math.max(-1.55, Math.min(1.55, orbit.elevation + TURN * dy));
+  }
+  if (down.size === 2) {
+    const [other] = [...down.values()].filter(each => each.pointerId !== event.pointerId);
+    const far = each => Math.hypot(each.clientX - other.clientX, each.clientY - other.clientY);
+    orbit.distance *= far(before) / Math.max(far(event), 1);
+  }
+  player.redraw();
+}
+
+// Lets time pass while it plays.
+function clock(player, ui) {
+  let last = performance.now(), drawn = last, late = 1;
+  const tick = async now => {
+    const speed = Number(ui.of("speed").value) * player.meta.fps, count = player.frames.count;
+    const elapsed = Math.min((now - last) / 1000, LONGEST_TICK) * Number(ui.of("speed").value);
+    last = now;
+    if (player.playing) {
+      ui.dragging(now);
+      const next = player.number + elapsed * player.meta.fps, over = player.frames.ended && next >= count - (player.live ? 1 : 0);
+      const due = player.live ? now - drawn > (player.drawing.software ? 900 / RATE : 0) : Math.floor(next) !== player.onCanvas;
+      if (over && player.live) await liveOn(player, count - 1, next);
+      else if (over) await player.show(0);
+      else if (due) await player.show(next);
+      else player.number = next;
+      if (due) {
+        late += 0.03 * (Math.min((now - drawn) / Math.max(1000 / speed, 1000 / RATE), 3) - late);
+        if (late > LATE && player.detail > COARSEST) { player.detail *= 0.8; late = 1; }
+        drawn = now;
+        ui.follow();
+      }
+    }
+    // where the next frame is far off, the browser may rest
+    const rest = player.live ? 0 : 1000 * (1 - player.number % 1) / speed - REFRESH;
+    setTimeout(() => requestAnimationFrame(tick), player.playing ? Math.max(Math.min(rest, 100), 0) : 0);
+  };
+  requestAnimationFrame(tick);
+}
+
+// After the last frame the waves live on; where they rest, nothing is drawn.
+async function liveOn(player, last, next) {
+  const moves = player.surfaces.some(surface => surface && !surface.still);
+  if (player.number < last) await player.show(last);
+  else if (moves) await player.liveOn((next - last) / player.meta.fps);
+}
+
+const player = new Player(document.getElementById("view"));
+window.ripplePlayer = {player, ready: player.start().then(() => { control(player); return player; })};
