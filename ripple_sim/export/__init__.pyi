@@ -5,7 +5,7 @@ from .exporter import (
 )
 from .moving_mesh import MovingMesh as MovingMesh
 from .options import ExportOptions as ExportOptions
-from .page import (
+from .page_coding import (
     packed as packed,
     parents_of as parents_of,
     quantised as quantised,

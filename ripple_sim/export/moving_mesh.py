@@ -124,9 +124,7 @@ class MovingMesh:
     def _gradients(self) -> MovedGradients:
         return MovedGradients(self._atlas)
 
-    def samples(
-        self, points: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    def samples(self, points: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Where some points [k] take their heights; see `spline_samples`."""
         return self._texels[points], self._offsets[points]
 

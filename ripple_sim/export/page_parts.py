@@ -112,6 +112,7 @@ def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
 
 
 def solid_part(solid: Solid) -> PagePart:
+    """A solid geom."""
     meta = {
         "name": solid.name,
         "target": False,
@@ -150,6 +151,7 @@ def _part(
 
 
 def data_uri(model: mujoco.MjModel, texture: int) -> str:
+    """A texture of the model as a picture within the page."""
     image = Image.fromarray(texture_pixels(model, texture))
     image.thumbnail((_MAX_IMAGE_SIZE, _MAX_IMAGE_SIZE))
     file = io.BytesIO()

@@ -7,7 +7,6 @@ from earlier ones and from the frame before.
 
 from __future__ import annotations
 
-import json
 from typing import Any, NamedTuple
 
 import mujoco
@@ -22,7 +21,7 @@ from ripple_sim.solver.waves.tape import Event, Tape
 
 from .moving_mesh import MovingMesh
 from .page_coding import packed, parents_of, quantised, residuals
-from .page_parts import PagePart, target_part
+from .page_parts import target_part
 from .source import Source
 from .wave_law import replay_reason, wave_law
 

@@ -92,6 +92,6 @@ class RecordedBackend:
             tape.events.append((kind, first, second))
 
     def break_off(self, reason: str) -> None:
-        """Tell the tapes of something that no event describes, in words after the surface's name."""
+        """Tell the tapes why they end, in words after the surface's name; no event describes it."""
         for tape in self.tapes:
             tape.broken = tape.broken or reason

@@ -1,9 +1,12 @@
 """A rippling egg under a stone, and a run of it in a loop of its own."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import pytest
+from chromium import launched
 from scene_files import write_scene
 
 from ripple_sim import Material, Ripples, Scene, load_scene
@@ -60,3 +63,9 @@ def ripples() -> Ripples:
 def soft_model() -> mujoco.MjModel:
     """An egg, and a soft body that falls."""
     return mujoco.MjModel.from_xml_string(SOFT)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    with launched("--use-angle=swiftshader", "--enable-unsafe-swiftshader") as made:
+        yield made

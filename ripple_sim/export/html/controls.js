@@ -203,4 +203,4 @@ async function liveOn(player, last, next) {
 }
 
 const player = new Player(document.getElementById("view"));
-window.ripplePlayer = {player, ready: player.start().then(() => { control(player); return player; })};
+window.ripplePlayer = {player, longestStep: law => longestStep(law, PLAIN), ready: player.start().then(() => { control(player); return player; })};
