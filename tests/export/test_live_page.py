@@ -25,7 +25,8 @@ BLOCK = """<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/>
 
 # a sheet with a rim, under a ball
 SHEET = """<mujoco><option timestep="0.002"/>
-<asset><hfield name="sheet" nrow="9" ncol="9" size=".5 .5 .1 .1"/></asset><worldbody><light pos="0 0 3"/><geom name="sheet" type="hfield" hfield="sheet"/>
+<asset><hfield name="sheet" nrow="9" ncol="9" size=".5 .5 .1 .1"/></asset>
+<worldbody><light pos="0 0 3"/><geom name="sheet" type="hfield" hfield="sheet"/>
 <body pos="0.05 0.02 0.055"><freejoint/><geom name="ball" size="0.05" rgba="1 0 0 1"/></body>
 </worldbody></mujoco>"""
 
