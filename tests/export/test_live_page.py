@@ -8,9 +8,18 @@ import mujoco
 import numpy as np
 import pytest
 from mujoco_models import forwarded
-from pages import opened
+from pages import opened, pixels
 
-from ripple_sim import Exporter, Material, Ripples, Scene, Target
+from ripple_sim import (
+    Exporter,
+    ExportOptions,
+    Material,
+    Ripples,
+    RippleWarning,
+    Scene,
+    Target,
+    export_scene,
+)
 
 STEPS = 8  # physics steps in a frame
 FRAMES = 20
@@ -201,3 +210,116 @@ def test_a_coarse_law_keeps_the_energy(browser: Any, tmp_path: Path) -> None:
         })""")
     assert energies[0] > 0
     assert np.abs(np.array(energies) / energies[0] - 1).max() < 1e-3
+
+
+@pytest.fixture(scope="module")
+def egg_page(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("egg") / "run.html"
+    ripples = egg(scene.model)
+    with Exporter(scene.model, ripples, path, fps=60, size=(320, 180)) as exporter:
+        data = forwarded(scene.model)
+        for _ in range(4):
+            ripples.mj_step(data, nstep=STEPS)
+            exporter.write(data)
+    return path
+
+
+def highest(tab: Any) -> float:
+    return tab.evaluate(
+        "ripplePlayer.player.surfaces[0].solver.read().h.reduce((most, h) => Math.max(most, h), 0)"
+    )
+
+
+def test_the_object_lives_on_after_the_end_and_keys_and_touch_reach_it(
+    browser: Any, egg_page: Path
+) -> None:
+    """On a phone: 360 pixels wide, three of the screen's to each."""
+    with opened(browser, egg_page, (360, 640), has_touch=True, device_scale_factor=3) as tab:
+        tab.evaluate("ripplePlayer.ready")
+        assert tab.evaluate("document.documentElement.scrollWidth") <= 360
+        tab.wait_for_function("ripplePlayer.player.number >= 3")
+        x, y = tab.evaluate("""(() => {
+            const {width, height} = ripplePlayer.player.canvas.getBoundingClientRect();
+            for (let y = 0; y < 1; y += 0.05) if (ripplePlayer.player.pick(0, -y)) {
+                return [width / 2, (1 + y + 0.05) / 2 * height];
+            }
+        })()""")
+        before = highest(tab)
+        tab.touchscreen.tap(x, y)
+        tab.wait_for_function("ripplePlayer.player.poked")
+        tab.wait_for_function(
+            f"ripplePlayer.player.surfaces[0].solver.read().h.some(h => h > {before} + 1e-4)"
+        )
+        assert tab.evaluate("document.getElementById('hint').className") == "gone"
+        tab.keyboard.press("Space")
+        assert not tab.evaluate("ripplePlayer.player.playing")
+        tab.keyboard.press("h")
+        assert tab.evaluate("ripplePlayer.player.heat")
+        tab.keyboard.press("g")
+        assert tab.evaluate("ripplePlayer.player.grid")
+        with tab.expect_download() as download:
+            tab.keyboard.press("p")
+        assert download.value.suggested_filename == "egg.png"
+
+
+def test_faster_waves_take_more_substeps_and_stay_finite(browser: Any, egg_page: Path) -> None:
+    with opened(browser, egg_page) as tab:
+        tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; })")
+        tab.click("#tune")
+        tab.evaluate("""(() => { for (const id of ["wave-speed", "stiffness"]) {
+            const slider = document.getElementById(id);
+            slider.value = 1;
+            slider.oninput();
+        } })()""")
+        speed, stiffness = tab.evaluate("""(() => {
+            const {speed, stiffness} = ripplePlayer.player.surfaces[0].sliders;
+            return [speed, stiffness];
+        })()""")
+        assert (speed, stiffness) == (4, 4)
+        spot = tab.evaluate("[0, 0.2]")
+        tab.evaluate("spot => ripplePlayer.player.poke(ripplePlayer.player.pick(...spot), 1)", spot)
+        tab.evaluate("ripplePlayer.player.liveOn(5)")
+        assert 0 < highest(tab) < 0.1
+
+
+def test_a_lost_graphics_card_comes_back_with_the_waves(browser: Any, egg_page: Path) -> None:
+    with opened(browser, egg_page) as tab:
+        tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; })")
+        tab.evaluate("ripplePlayer.player.chooseSolvers('pass')")
+        tab.evaluate("ripplePlayer.player.poke(ripplePlayer.player.pick(0, 0.2), 1)")
+        tab.evaluate("ripplePlayer.player.liveOn(0.1)")
+        before = tab.evaluate("Array.from(ripplePlayer.player.surfaces[0].solver.read().h)")
+        picture = pixels(tab)
+        tab.evaluate("""(() => {
+            window.card = ripplePlayer.player.drawing.gl.getExtension("WEBGL_lose_context");
+            card.loseContext();
+        })()""")
+        tab.wait_for_function("ripplePlayer.player.drawing.lost")
+        tab.evaluate("card.restoreContext()")
+        tab.wait_for_function("!ripplePlayer.player.drawing.lost")
+        tab.evaluate("ripplePlayer.player.paint()")
+        after = tab.evaluate("Array.from(ripplePlayer.player.surfaces[0].solver.read().h)")
+        assert np.abs(before).max() > 0
+        assert after == before
+        assert np.abs(pixels(tab) - picture).mean() < 0.5  # of 255
+
+
+def test_a_browser_without_webgl_says_so(browser: Any, egg_page: Path) -> None:
+    tab = browser.new_page()
+    tab.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    tab.goto(egg_page.as_uri())
+    tab.wait_for_function("document.getElementById('hint').textContent.includes('WebGL 2')")
+    tab.close()
+
+
+def test_what_a_page_replays_is_said_with_the_reason(scene: Scene, tmp_path: Path) -> None:
+    material = Material(speed=0.5, density=900.0, yield_height=0.01)
+    ripples = Ripples(scene.model, {"egg": material}, resolution=8, backend="cpu")
+    with (
+        pytest.warns(RippleWarning, match="replays 'egg'.*keeps dents"),
+        Exporter(scene.model, ripples, tmp_path / "dents.html") as exporter,
+    ):
+        exporter.write(forwarded(scene.model))
+    assert 'class="law"' not in (tmp_path / "dents.html").read_text()
+    export_scene(scene, tmp_path / "film.html", ExportOptions(duration=0.02, replay=True))
+    assert 'class="law"' not in (tmp_path / "film.html").read_text()

@@ -22,6 +22,8 @@ function control(player) {
   keys(player, ui);
   pointer(player, ui);
   window.onresize = () => player.redraw();
+  player.canvas.addEventListener("webglcontextlost", event => { event.preventDefault(); player.lose(); });
+  player.canvas.addEventListener("webglcontextrestored", () => player.regain());
   ui.follow();
   clock(player, ui);
 }
@@ -91,8 +93,8 @@ function sliders(player, of) {
 
 // More damping: up to the rate that ends a wave on its way over the object; less: down to none.
 function slidersOf(law, speed, damping, stiffness) {
-  const {meta: {rates, size, resolution}} = law, mean = law.damping.reduce((sum, x) => sum + x, 0) / law.count;
-  const across = 0.4 * Math.sqrt(rates.links) * size / resolution / size * 4;  // [1/s]
+  const mean = law.damping.reduce((sum, x) => sum + x, 0) / law.count;
+  const across = 4 * 0.4 * Math.sqrt(law.meta.rates.links) / Math.sqrt(law.count / 6);  // of waves that go 0.4 texels in 1 / sqrt(rate) [1/s]
   return {speed, stiffness, damping: damping < 0 ? damping * mean : damping * (mean + across)};
 }
 
@@ -142,7 +144,13 @@ function pointer(player, ui) {
     else canvas.style.cursor = player.frame && player.pick(...place(event)) ? "pointer" : "grab";
     if (down.has(event.pointerId)) down.set(event.pointerId, event);
   };
-  canvas.onwheel = event => { event.preventDefault(); player.free(); player.orbit.distance *= Math.exp(0.001 * event.deltaY); player.redraw(); };
+  canvas.onwheel = event => {
+    if (window.top !== window && !document.hasFocus()) return;  // within another page, which scrolls
+    event.preventDefault();
+    player.free();
+    player.orbit.distance *= Math.exp(0.001 * event.deltaY);
+    player.redraw();
+  };
   canvas.oncontextmenu = event => event.preventDefault();
 }
 
@@ -204,3 +212,8 @@ async function liveOn(player, last, next) {
 
 const player = new Player(document.getElementById("view"));
 window.ripplePlayer = {player, longestStep: law => longestStep(law, PLAIN), ready: player.start().then(() => { control(player); return player; })};
+window.ripplePlayer.ready.catch(error => {
+  const hint = document.getElementById("hint");
+  hint.hidden = false;
+  hint.textContent = `This page cannot be shown: ${error.message}`;
+});

@@ -1,5 +1,6 @@
 // The player: the run in time, its waves, and the picture. Tests and other pages may use `ripplePlayer`.
 const ARROW_LENGTH = 0.25;  // of the strongest contact, in distances of the camera
+const WIDEST_KEPT = 1.4;  // aspect of the scene's picture that is wholly in view on a tall screen
 const COLOR_SHARE = 0.8;  // of the greatest height so far, which has the strongest colours
 
 function arrowPart() {
@@ -36,6 +37,22 @@ class Player {
     this.limits = this.targets.map((_, i) => this.surfaces[i] ? least : this.meta.steps[i]);
     this.strongest = 1e-9;
     await this.show(0);
+  }
+
+  // The graphics card was lost, as on a sleeping phone: the loop has the waves as they were last drawn.
+  lose() {
+    this.drawing.lost = true;
+    for (const surface of this.surfaces) if (surface) { surface.solver.current = true; surface.use(new WaveLoop(surface.law)); }
+  }
+
+  // It came back: everything that was on it is made anew.
+  async regain() {
+    const drawing = new Drawing(this.canvas, this.meta);
+    await drawing.load();
+    this.drawing = drawing;
+    for (const surface of this.surfaces) if (surface) surface.grid = null;
+    this.chooseSolvers();
+    await this.paint();
   }
 
   // Whether the page solves the waves of any target.
@@ -147,9 +164,15 @@ class Player {
       up = cross(back, right);
       eye = add(focus, back, distance);
     }
-    const half = Math.tan(this.meta.fovy * Math.PI / 360), near = 0.02 * distance, far = 100 * distance;
+    const fovy = this.fovy(aspect), half = Math.tan(fovy * Math.PI / 360), near = 0.02 * distance, far = 100 * distance;
     return {eye, right, up, back, focus, distance, ray: [scaled(back, -1), scaled(right, half * aspect), scaled(up, half)],
-      matrix: times(perspective(this.meta.fovy, aspect, near, far), viewOf(eye, right, up, back))};
+      matrix: times(perspective(fovy, aspect, near, far), viewOf(eye, right, up, back))};
+  }
+
+  // The scene's angle of view from below to above [degrees]; a wider one on a tall screen, so that as much is seen to the sides.
+  fovy(aspect) {
+    const wider = Math.max(1, Math.min(this.meta.aspect, WIDEST_KEPT) / aspect);
+    return 360 / Math.PI * Math.atan(wider * Math.tan(this.meta.fovy * Math.PI / 360));
   }
 
   // Takes the camera over from the scene.
