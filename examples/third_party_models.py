@@ -35,7 +35,6 @@ TOLD = {
     "too steep": "waves too steep",
     "would pass through": "too fast for the time step",
     "turned over": "triangles turned over",
-    "mjGEOM_LINE": "rays of range finders are not drawn",
 }
 
 

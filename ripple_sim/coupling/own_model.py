@@ -91,7 +91,8 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
     """MuJoCo's data itself, also of dm_control's wrapper.
 
     Its model is `model`, even if that was changed since, or a copy in which bodies move and
-    collide alike. For data that is only `drawn`, equal shapes and places are enough. Raises
+    collide alike. Data that is only `drawn` may have a model with other numbers in the same
+    arrays, as for `mujoco.Renderer`: sizes and colours are then those of `model`. Raises
     `SceneError` if `data` is something else, or belongs to another model.
     """
     found = data if isinstance(data, mujoco.MjData) else getattr(data, "ptr", None)
@@ -102,7 +103,6 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
     other = found.model
     if other is model or other in _copies.get(model, ()):
         return found
-    kinds = _SHAPES if drawn else _DYNAMICS
     differing: str | None = None
     if not (found.signature and model.signature):
         # MuJoCo drops signatures in pickling, and gives the data a model of its own
@@ -110,8 +110,8 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
             differing = "sizes"
     elif found.signature != model.signature:
         differing = "signature"
-    else:
-        differing = _differing(model, other, kinds)
+    elif not drawn:
+        differing = _differing(model, other, _DYNAMICS)
     if differing:
         raise SceneError(
             f"data belongs to another model ({_sizes(other)}) than that of the ripples "

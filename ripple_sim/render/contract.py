@@ -224,12 +224,22 @@ FRAME = Struct(
     shown_far="vec4",  # x, y: where fog begins and is complete [m]; z: 1 where the skybox is shown
     counts="vec4",  # y: lights, z: number of the exposure, w: lights that cast shadows
 )
+
+
+class Shading(IntEnum):
+    """How the light on an object is computed."""
+
+    BACK_AS_FRONT = -1  # the back of a sheet is as bright as its front
+    USUAL = 0
+    HEATMAP = 1  # colours are shown as they are, except for shadows
+    UNLIT = 2  # colours are shown as they are
+
+
 OBJECT = Struct(
     "Object",
     base="vec4",  # roughness, metallic, sheen, coat
     volume="vec4",  # translucency, transparency, emission, opacity
-    # geom, size [m], shadow bias [m]; 1: colours are those of a heatmap, -1: a sheet's back is lit
-    # as its front
+    # geom, size [m], shadow bias [m], one of `Shading`
     place="vec4",
     # layer; 1 with a height map, 0 without; bits of the occluders near a geom; a chart's side with
     # its halo [texels]
@@ -246,6 +256,7 @@ DEFINES: dict[str, object] = {
     **numbered(Binding, "_BINDING"),
     **numbered(MappingKind),
     **numbered(CasterMap, "_MAP"),
+    **numbered(Shading, "_SHADING"),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
     **{
         f"{struct.name.upper()}_MEMBERS": struct.members

@@ -23,7 +23,7 @@ from ripple_sim.render.visuals.visual import Visual, target_visual
 from ripple_sim.solver.errors import RippleError
 
 from .bounds import balls_about
-from .contract import CasterMap, MappingKind
+from .contract import CasterMap, MappingKind, Shading
 from .height_map_textures import AnyHeightMap, HeightMapTextures, MovedHeightMap
 
 # Length of an edge [pixels], where the target fills the frame's height.
@@ -115,13 +115,13 @@ class SurfaceMesh:
         self.occludes = True
         self.casts = True
         self.is_plane = False
-        heatmap = surface.heatmap_colors is not None
+        has_heatmap = surface.heatmap_colors is not None
         number = assets.objects.add(
             look,
             geom,
             identity=visual.identity,
             size=self._radius,
-            heatmap=heatmap,
+            shading=Shading.HEATMAP if has_heatmap else Shading.USUAL,
             height_map=index,
             chart=page.block,
         )

@@ -158,6 +158,18 @@ def test_data_without_poses_is_drawn_as_forwarded(egg):
     assert not new.xquat.any()
 
 
+def test_data_of_a_model_of_other_sizes_is_drawn_with_the_sizes_of_the_renderer(egg):
+    model, data, _, renderer = egg
+    larger = copy.copy(model)
+    larger.geom_size[:] *= 1.5
+    of_larger = mujoco.MjData(larger)
+    mujoco.mj_forward(larger, of_larger)
+    assert np.array_equal(renderer.render(of_larger, "side"), renderer.render(data, "side"))
+    without_egg = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
+    with pytest.raises(RippleError, match="data belongs to another model"):
+        renderer.render(mujoco.MjData(without_egg), "side")
+
+
 def test_a_model_in_which_another_geom_would_ripple_is_refused(egg):
     _, _, ripples, _ = egg
     egg_geom = '<geom name="egg" type="ellipsoid" size="0.4 0.3 0.3" rgba="0.9 0.1 0.1 1"/>'

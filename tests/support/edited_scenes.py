@@ -80,6 +80,31 @@ def added(scene: mujoco.MjvScene) -> None:
     scene.ngeom += 2
 
 
+def lines(scene: mujoco.MjvScene) -> None:
+    """Lines that are as far at both ends, the edges of a box, and triangles from both sides."""
+    kinds = mujoco.mjtGeom
+    turn = np.eye(3)
+    slanted = turn.copy()
+    slanted[:, 2] = np.array([1.5, 0.45, 1]) / np.linalg.norm([1.5, 0.45, 1])
+    entries = (
+        (kinds.mjGEOM_LINE, [6, 6, 4.5], [-1.5, -1, 0.4], turn[:, [1, 2, 0]], [1, 0, 0]),
+        (kinds.mjGEOM_LINE, [8, 8, 3], [0.2, -3, 0.3], slanted, [0, 1, 0]),
+        (kinds.mjGEOM_LINEBOX, [1.6, 0.5, 0.4], [0, -1, 1.6], turn, [0, 0, 1]),
+        (kinds.mjGEOM_TRIANGLE, [1.5, 2, 0], [-2, -1.5, 1.5], turn, [1, 1, 0]),
+        (kinds.mjGEOM_TRIANGLE, [1, 1.5, 0], [2.5, 1, 2], turn * [-1, -1, 1], [1, 0, 1]),
+        (kinds.mjGEOM_TRIANGLE, [1, 2, 0], [0, 1, 2], turn * [1, -1, -1], [0, 1, 1]),
+    )
+    for number, (kind, size, place, rotation, color) in enumerate(entries):
+        entry = scene.geoms[scene.ngeom]
+        rgba = np.array([*color, 1], np.float32)
+        mujoco.mjv_initGeom(entry, kind, np.array(size), np.array(place), rotation.ravel(), rgba)
+        entry.category = DYNAMIC
+        entry.segid = scene.ngeom
+        entry.objtype = mujoco.mjtObj.mjOBJ_UNKNOWN
+        entry.objid = 80 + number
+        scene.ngeom += 1
+
+
 def camera_moved(scene: mujoco.MjvScene) -> None:
     for camera in scene.camera:
         camera.pos = np.add(camera.pos, (0.7, 1, 0.2))
@@ -105,7 +130,7 @@ def lamp(scene: mujoco.MjvScene) -> None:
 
 EDITS = {
     edit.__name__: edit
-    for edit in (ghost, moved, target_moved, other_shapes, taken_away, added, camera_moved)
+    for edit in (ghost, moved, target_moved, other_shapes, taken_away, added, lines, camera_moved)
 }
 
 

@@ -93,7 +93,7 @@ vec3 shaded(Object object, SurfaceSample surface, vec3 albedo, vec3 position, fl
     float translucency = object.volume.x, transparency = object.volume.y, emission = object.volume.z;
     float size = object.place.y, bumps = object.place.z;  // those that the shading normal accounts for
     vec3 normal = surface.rippled, flat_normal = surface.normal, view = normalize(start - position);
-    bool from_behind = object.place.w < 0.0 && surface.inner;  // of a sheet that is lit on its front
+    bool from_behind = object.place.w == BACK_AS_FRONT_SHADING && surface.inner;  // of a sheet that is lit on its front
     normal = from_behind ? -normal : normal;
     flat_normal = from_behind ? -flat_normal : flat_normal;
     // interpolated normals of bumpy silhouettes may look away from the camera
@@ -209,9 +209,10 @@ float rippled(inout SurfaceSample surface, bvec2 same)
 vec4 lit_solid(SurfaceSample surface, vec3 position, float spread, bvec2 block)
 {
     Object object = object_at(surface.object);
-    bool heatmap = object.place.w > 0.0;
+    bool heatmap = object.place.w == HEATMAP_SHADING, unlit = object.place.w == UNLIT_SHADING;
     vec3 albedo = heatmap ? vec3(NEUTRAL) : surface.color * surface.color;
-    vec3 shown = tone_mapped(shaded(object, surface, albedo, position, spread, block));
+    vec3 radiance = shaded(object, surface, albedo, position, spread, block);  // of all, for neighbours take shadows over
+    vec3 shown = unlit ? encoded(albedo) : tone_mapped(radiance);
     float shade = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / FULL_LIGHT, DARKEST, 1.0);
     return vec4(mix(heatmap ? surface.color * shade : shown, INK, surface.ink), object.volume.w);
 }

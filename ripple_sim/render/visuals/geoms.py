@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.ids import GeomId
-from ripple_sim.render.contract import CasterMap
+from ripple_sim.render.contract import CasterMap, Shading
 from ripple_sim.render.pose import Pose
 from ripple_sim.render.resources import Resources
 
 from .objects import Assets, Occluders
-from .shapes import NamedShape, Shape, shape_of, sizes
+from .shapes import NamedShape, Shape, facing_lines, shape_of, sizes
 from .texture_mapping import TextureMapping, mapping_of
 from .visual import Visual, ball_of, geom_visual, host_of, look_of, site_visual, visible_sites
 
@@ -37,6 +37,7 @@ INSTANCE = np.dtype(
 )
 _GEOM = mujoco.mjtGeom
 _ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
+_SHEETS = (_GEOM.mjGEOM_PLANE, _GEOM.mjGEOM_TRIANGLE, _GEOM.mjGEOM_LINE)
 # Kinds that have as many segments as the frame needs; other kinds always have the same mesh.
 _WITH_LEVELS = (
     *_ROUND,
@@ -127,7 +128,8 @@ class Instances:
     blocks : bool
         Whether no light passes.
     is_plane : bool
-        A plane is seen from both sides.
+    is_sheet : bool
+        Whether it has no inside, and is seen from both sides.
     occludes : bool
         Whether it hides the sky from things below: opaque geoms do.
     casts : bool
@@ -162,6 +164,7 @@ class Instances:
         self.transparent = self._visual.opacity < 1.0
         self.blocks = self._visual.passes == 0.0
         self.is_plane = self._visual.kind == _GEOM.mjGEOM_PLANE
+        self.is_sheet = self._visual.kind in _SHEETS
         self.occludes = self.blocks and not (self._visual.site or self._visual.pose)
         self.casts = self._visual.casts
         self._indices = np.array([visual.index for visual, _ in members], dtype=np.int64)
@@ -196,8 +199,11 @@ class Instances:
         in MuJoCo, and each round member has its own level.
         """
         position, rotation = self._places(data)
+        rotation = rotation.reshape(-1, 3, 3)
         member_sizes = self._sharp_sizes if sharp else self._round_sizes
-        self._records["rotation"] = rotation.reshape(-1, 3, 3).transpose(0, 2, 1)
+        if self._visual.kind == _GEOM.mjGEOM_LINE:
+            rotation, member_sizes = facing_lines(member_sizes, position, rotation, pose, height)
+        self._records["rotation"] = rotation.transpose(0, 2, 1)
         self._records["origin"] = position
         self._records["core_size"] = member_sizes[:, 0]
         self._records["shell_size"] = member_sizes[:, 1]
@@ -294,12 +300,12 @@ class Instances:
                 self._programs[seen], content, indices, skip_errors=True
             )
         with self._assets.resources.gl as ctx:
-            if self.is_plane:
+            if self.is_sheet:
                 ctx.disable(moderngl.CULL_FACE)
             self._arrays[seen, segments, members].render(
                 vertices=self._level.count(segments), instances=count
             )
-            if self.is_plane:
+            if self.is_sheet:
                 ctx.enable(moderngl.CULL_FACE)
 
 
@@ -313,6 +319,15 @@ def _segments(
     """
     needed = np.pi / 4 / np.sqrt(2 * np.minimum(flatness / np.maximum(radius, 1e-9), 1.0))
     return np.array(levels)[np.minimum(np.searchsorted(levels, needed), len(levels) - 1)]
+
+
+def _shading_of(visual: Visual) -> Shading:
+    """Shading of a visual, as in MuJoCo."""
+    if visual.kind == _GEOM.mjGEOM_LINE:
+        return Shading.UNLIT
+    if visual.behind or visual.kind == _GEOM.mjGEOM_TRIANGLE:
+        return Shading.BACK_AS_FRONT
+    return Shading.USUAL
 
 
 def visuals_of(model: Any, geoms: Iterable[GeomId]) -> list[tuple[Visual, NamedShape]]:
@@ -350,7 +365,11 @@ def instances_of(
         look = look_of(model, visual)
         host = host_of(model, visual)
         number = assets.objects.add(
-            look, host, opacity=visual.opacity, identity=visual.identity, lit_in_front=visual.behind
+            look,
+            host,
+            opacity=visual.opacity,
+            identity=visual.identity,
+            shading=_shading_of(visual),
         )
         name, _ = shape
         key = (

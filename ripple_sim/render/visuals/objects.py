@@ -9,7 +9,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.contract import MAX_OCCLUDERS, OBJECT, OBJECT_COLUMNS, Binding, Unit
+from ripple_sim.render.contract import (
+    MAX_OCCLUDERS,
+    OBJECT,
+    OBJECT_COLUMNS,
+    Binding,
+    Shading,
+    Unit,
+)
 from ripple_sim.render.resources import Resources
 from ripple_sim.render.srgb_textures import srgb_cube, srgb_texture, write_srgb
 from ripple_sim.render.tone_mapping import srgb_to_linear
@@ -51,8 +58,7 @@ class ObjectTable:
         identity: tuple[int, int] = (-1, -1),
         opacity: float = 1.0,
         size: float = 1.0,
-        heatmap: bool = False,
-        lit_in_front: bool = False,
+        shading: Shading = Shading.USUAL,
         height_map: int | None = None,
         chart: int = 0,
     ) -> int:
@@ -66,10 +72,7 @@ class ObjectTable:
             Id and type, of `mujoco.mjtObj`, of the object.
         size : float
             Thickness of a transparent object where its relative thickness is 1 [m].
-        heatmap : bool
-            Whether colours are shown as they are, except for shadows.
-        lit_in_front : bool
-            Whether the back of a sheet is as bright as its front.
+        shading : Shading
         height_map : int, optional
             Layer of the object's height map.
         chart : int
@@ -77,7 +80,7 @@ class ObjectTable:
         """
         row = np.zeros((), dtype=_ROW)
         row["volume"][3] = opacity
-        row["place"] = geom, size, 0.0, -1.0 if lit_in_front else heatmap
+        row["place"] = geom, size, 0.0, shading
         row["height_map"] = 0 if height_map is None else (height_map, 1, 0, chart)
         self._rows.append(row)
         self.identities.append(identity)

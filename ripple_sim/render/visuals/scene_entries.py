@@ -24,6 +24,8 @@ from .visual import GEOM_OBJECT, SITE_OBJECT, Finish, SceneTexture, Visual, geom
 _GEOM = mujoco.mjtGeom
 _MESHES = (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF)
 _SOFT = (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN)
+# Types of entries whose visuals do not follow the entry's pose.
+_ALWAYS_NEW = (*_SOFT, _GEOM.mjGEOM_LINEBOX)
 _DECOR = int(mujoco.mjtCatBit.mjCAT_DECOR)
 
 # How far the position of an infinite plane, rounded by the scene, may be off the plane, over its
@@ -33,9 +35,15 @@ _MAX_OFF_PLANE = 1e-5
 # Difference between two boxes up to which they are equal, over their size.
 _SAME_BOX = 1e-3
 
+# Width of the edges of a box of lines, over the model's width of lines.
+_BOX_LINE_WIDTH = 1.5
+
 
 def content_of(entry: mujoco.MjvGeom) -> tuple[Any, ...]:
-    """Everything that an entry shows, except its pose; a flex or skin never equals another."""
+    """Everything that an entry shows, except its pose.
+
+    A flex, a skin or a box of lines never equals another.
+    """
     return (
         entry.objid,
         entry.objtype,
@@ -52,7 +60,7 @@ def content_of(entry: mujoco.MjvGeom) -> tuple[Any, ...]:
         entry.texrepeat.tobytes(),
         entry.rgba.tobytes(),
         entry.size.tobytes(),
-        object() if entry.type in _SOFT else None,
+        object() if entry.type in _ALWAYS_NEW else None,
     )
 
 
@@ -79,7 +87,7 @@ def visuals_in(
     ghost: bool = False,
     reshaped: Collection[tuple[str, int]] = (),
 ) -> list[Visual]:
-    """Visuals of an entry of a scene: one, or for a flex its faces, edges and vertices.
+    """Visuals of an entry of a scene: one, or the edges of a box of lines, or the parts of a flex.
 
     A `ghost` of a geom or a site is shown beside the model's own. For `reshaped` see `own_visual`.
     """
@@ -101,6 +109,8 @@ def visuals_in(
         box=asset_box(model, int(entry.type), asset),
         **_paint_of(entry),
     )
+    if entry.type == _GEOM.mjGEOM_LINEBOX:
+        return _edges_of_box(visual)
     if entry.type not in _SOFT:
         return [visual]
     in_world = replace(visual, pose=(np.zeros(3, np.float32), np.eye(3, dtype=np.float32)))
@@ -111,6 +121,24 @@ def visuals_in(
         material = in_world.material if part == "faces" else -1
         visuals.append(replace(in_world, corners=corners, part=part, material=material))
     return visuals
+
+
+def _edges_of_box(box: Visual) -> list[Visual]:
+    """The twelve edges of a box, as lines."""
+    position, rotation = box.pose  # type: ignore[misc]
+    half = box.half_sizes
+    edges = []
+    for axis in range(3):
+        axes = [(axis + 1) % 3, (axis + 2) % 3, axis]
+        size = np.array([_BOX_LINE_WIDTH, _BOX_LINE_WIDTH, 2 * half[axis]])
+        for signs in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            corner = np.zeros(3)
+            corner[axes] = half[axes] * [*signs, -1]
+            pose = (position + rotation @ corner).astype(np.float32), rotation[:, axes]
+            edges.append(
+                replace(box, kind=int(_GEOM.mjGEOM_LINE), size=size, half_size=size, pose=pose)
+            )
+    return edges
 
 
 def own_visual(

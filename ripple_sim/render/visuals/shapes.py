@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.target_mesh import height_field_triangles, mesh_arrays
+from ripple_sim.render.pose import Pose
 from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CHART_V
 
 from .corners import normalized, split_corners
@@ -24,6 +25,7 @@ from .visual import WALLS, Visual
 
 _BEVEL = 0.06  # radius of round edges, in smallest half sizes
 _INFINITE_HALF_SIZE = 100.0  # of infinite planes, in extents of the model
+_MIN_LINE_WIDTH = 1e-3  # keeps normals finite [pixels]
 _GEOM = mujoco.mjtGeom
 
 
@@ -93,6 +95,23 @@ def sheet() -> Shape:
     core = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
     up = np.tile([0.0, 0.0, 1.0], (4, 1))
     return Shape(core, up, up, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+def triangle() -> Shape:
+    """Right triangle in the xy plane, whose legs of length 1 meet at the origin."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    return Shape(corners, np.zeros((3, 3)), np.tile([0.0, 0.0, 1.0], (3, 1)), np.array([[0, 1, 2]]))
+
+
+def line() -> Shape:
+    """Ribbon along z from 0 to 1 in the xz plane.
+
+    The core has half its width at the start, the shell half its width at the end.
+    """
+    core = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
+    shell = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    across = np.tile([0.0, 1.0, 0.0], (4, 1))
+    return Shape(core, shell, across, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
 def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -204,6 +223,8 @@ _SHAPES: dict[int, NamedShape] = {
     _GEOM.mjGEOM_CYLINDER: ("cylinder", lambda n: cylinder(4 * n, 3)),
     _GEOM.mjGEOM_BOX: ("box", lambda n: box(min(n // 3, 3))),
     _GEOM.mjGEOM_PLANE: ("sheet", lambda n: sheet()),
+    _GEOM.mjGEOM_TRIANGLE: ("triangle", lambda n: triangle()),
+    _GEOM.mjGEOM_LINE: ("line", lambda n: line()),
     # MuJoCo's arrows: a shaft of radius 1 and length 2, and a head of length 1
     _GEOM.mjGEOM_ARROW: ("arrow", _arrow((0, 0), (1, 0), (1, 2), (1.75, 2), (0, 3))),
     _GEOM.mjGEOM_ARROW1: ("arrow1", _arrow((0, 0), (1, 0), (1, 2), (0, 3))),
@@ -244,7 +265,8 @@ def sizes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Core and shell size of a visual [m], shape [3] each; see the top of the module.
 
-    `bevel` is the radius of round edges over the smallest half size.
+    `bevel` is the radius of round edges over the smallest half size. The width of a line is
+    in pixels, see `facing_lines`.
     """
     half = visual.half_sizes
     match visual.kind:
@@ -255,6 +277,12 @@ def sizes(
         case _GEOM.mjGEOM_PLANE:
             half = np.where(half > 0, half, _INFINITE_HALF_SIZE * model.stat.extent)
             return np.array([half[0], half[1], 0.0]), np.full(3, 1e-9)
+        case _GEOM.mjGEOM_TRIANGLE:
+            return half * [1, 1, 0], np.full(3, 1e-9)
+        case _GEOM.mjGEOM_LINE:
+            width = max(half[0] * model.vis.global_.linewidth, _MIN_LINE_WIDTH)
+            size = np.array([width / 2, width / 2, half[2]])
+            return size, size
         case _GEOM.mjGEOM_CYLINDER | _GEOM.mjGEOM_BOX:
             round_edge = bevel * half.min()
             return half - round_edge, np.full(3, round_edge)
@@ -262,3 +290,49 @@ def sizes(
             return np.zeros(3), half / [1, 1, 6]
         case _:
             return np.zeros(3), np.ones(3)
+
+
+def facing_lines(
+    pixel_sizes: NDArray[np.float64],
+    starts: NDArray[np.float64],
+    rotations: NDArray[np.float64],
+    pose: Pose,
+    height: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lay the ribbons of lines across the view, and make them equally wide along their lengths.
+
+    A ribbon has the line's depth across all of its width.
+
+    Parameters
+    ----------
+    pixel_sizes : float64 [k, 2, 3]
+        Core and shell sizes, with widths in pixels, see `sizes`.
+    starts, rotations : array, shapes [k, 3] and [k, 3, 3]
+        Where the lines begin [m], and rotations of their frames; lines extend along z.
+    pose, height
+        The camera, and the height of its frame [pixels].
+
+    Returns
+    -------
+    frames : float64 [k, 3, 3]
+        Axes of the ribbons, as columns.
+    sizes : float64 [k, 2, 3]
+        Core and shell sizes [m].
+    """
+    axes = rotations[:, :, 2]
+    ends = starts + axes * pixel_sizes[:, 0, 2:]
+    ahead = -pose.rotation[:, 2]
+    ways = pose.ways(starts)
+    # directions of the lines in the picture, in the plane of the picture
+    seen = axes * (ways @ ahead)[:, None] - ways * (axes @ ahead)[:, None]
+    across = np.cross(ahead, seen)
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    # a line that is seen along its axis is a point
+    across = np.where(length > 0, across / np.maximum(length, 1e-300), rotations[:, :, 0])
+    frames = np.stack([across, np.cross(axes, across), axes], axis=2)
+    _, depth = pose.local(np.stack([starts, ends], axis=1))
+    near, _ = pose.clip_planes
+    distance = np.ones_like(depth) if pose.orthographic else np.maximum(depth, near)
+    scaled = pixel_sizes.copy()
+    scaled[:, :, :2] *= (distance * pose.pixel_height(1.0, height))[..., None]
+    return frames, scaled

@@ -177,8 +177,8 @@ class Visual:
 
     @property
     def casts(self) -> bool:
-        """Whether it casts shadows: everything does that does not explain a scene, as in MuJoCo."""
-        return not self.decor
+        """Whether it casts shadows: all but lines and what explains a scene does, as in MuJoCo."""
+        return not self.decor and self.kind != _GEOM.mjGEOM_LINE
 
     @property
     def color(self) -> NDArray[np.float64]:
@@ -330,6 +330,8 @@ def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
         half = 2 * visual.half_sizes
         if visual.box is not None:
             centre, half = visual.box
+        elif visual.kind == _GEOM.mjGEOM_LINE:  # its other sizes are in pixels
+            centre = half = visual.half_sizes * [0, 0, 0.5]
         return np.array([[*(position + rotation @ centre), np.linalg.norm(half)]])
     if visual.site:
         half = visual.half_sizes

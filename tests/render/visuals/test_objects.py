@@ -5,6 +5,7 @@ import pytest
 from mujoco_models import posed
 from shader_functions import evaluated
 
+from ripple_sim.render.contract import Shading
 from ripple_sim.render.pose import Pose
 from ripple_sim.render.visuals import (
     LOOKS,
@@ -140,7 +141,7 @@ def read(gl, table, expression, count=1) -> np.ndarray:
 def test_shaders_find_a_look_in_its_row(gl, table):
     assert not read(gl, table, "object_at(0).base").any()  # of a table that is empty
     table.add(Look((0, 0, 0), 1.0), 3)
-    number = table.add(LOOK, 17, opacity=0.25, size=2.5, heatmap=True, height_map=4)
+    number = table.add(LOOK, 17, opacity=0.25, size=2.5, shading=Shading.HEATMAP, height_map=4)
     row = f"object_at({number})"
     np.testing.assert_allclose(read(gl, table, f"{row}.base")[0], [0.4, 0.5, 0.6, 0.7], rtol=1e-6)
     np.testing.assert_allclose(
