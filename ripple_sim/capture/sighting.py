@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.ids import TargetId
 from ripple_sim.render.pose import Pose
 from ripple_sim.render.surface_image import SurfaceImage
-from ripple_sim.render.surfaces.adaptive import spline_heights, spline_samples
 from ripple_sim.render.surfaces.moving import MovingVertices
+from ripple_sim.render.surfaces.spline import spline_heights, spline_samples
 from ripple_sim.solver.texels.chart_page import ChartPage
 
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.surfaces.adaptive import spline_samples, spline_weights
 from ripple_sim.render.surfaces.moving import MovingVertices
+from ripple_sim.render.surfaces.spline import spline_samples, spline_weights
 from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.render.surfaces.tessellation import COORDINATES, DIRECTION, NORMAL, POSITION, UV
 from ripple_sim.render.surfaces.vertices import tessellated

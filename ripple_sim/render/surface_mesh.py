@@ -9,11 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.ids import TargetId, is_geom
-from ripple_sim.render.surfaces.adaptive import (
-    AdaptiveTessellation,
-    DeviceTessellation,
-    Displacement,
-)
+from ripple_sim.render.surfaces.adaptive import AdaptiveTessellation, DeviceTessellation
+from ripple_sim.render.surfaces.displacement import Displacement
 from ripple_sim.render.surfaces.moving import MovingOcclusion, MovingVertices
 from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearance
 from ripple_sim.render.surfaces.tessellation import BAKED, DIRECTION, NORMAL, POSITION

@@ -4,7 +4,7 @@
 layout(binding = HEIGHT_MAPS_UNIT) uniform sampler2DArray height_maps;
 
 // Weights of the texels before, at and after the nearest one, along both axes, for a place at a distance from its centre
-// [texels]; `spline_weights` in adaptive.py is the same.
+// [texels]; `spline_weights` in spline.py is the same.
 mat3x2 spline_weights(vec2 t)
 {
     return mat3x2(0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t));

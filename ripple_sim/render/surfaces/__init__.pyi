@@ -1,11 +1,11 @@
-from .adaptive import (
-    AdaptiveTessellation as AdaptiveTessellation,
-    Displacement as Displacement,
+from .adaptive import AdaptiveTessellation as AdaptiveTessellation
+from .displacement import Displacement as Displacement
+from .moving import MovingOcclusion as MovingOcclusion, MovingVertices as MovingVertices
+from .spline import (
     spline_heights as spline_heights,
     spline_samples as spline_samples,
     spline_weights as spline_weights,
 )
-from .moving import MovingOcclusion as MovingOcclusion, MovingVertices as MovingVertices
 from .surface import (
     Charts as Charts,
     Surface as Surface,

@@ -1,8 +1,8 @@
-"""The mesh of a target in a frame: edges are split where the waves bend, vertices are displaced.
+"""Adaptive tessellation: the edges of a target's mesh are split where the waves bend, frame by frame.
 
 Edges are split where the waves are computed: on the processor, from heights in its memory, or on
 the GPU, by compute shaders, from heights in a texture. Both give the same triangles in the same
-order. Heights between the texels are interpolated by a quadratic B-spline (glsl/height_maps.glsl).
+order.
 """
 
 from __future__ import annotations
@@ -13,63 +13,14 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.contract import Binding
 from ripple_sim.render.resources import Resources
-from ripple_sim.solver.kernel import Floats, Floats32, Ints32, kernel
+from ripple_sim.solver.kernel import Floats, Ints32, kernel
 from ripple_sim.solver.texels.chart_page import ChartPage
 
-from .tessellation import BAKED, DIRECTION, NORMAL, POSITION
+from .spline import spline_heights, spline_samples
+from .tessellation import POSITION
 from .vertices import SurfaceVertices
 
 _GROUP = 256  # invocations in a work group of the compute shaders
-
-
-def spline_samples(
-    chart: NDArray, row: NDArray, column: NDArray, resolution: int
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """The 3 x 3 texels about places on charts, [k] each, and how far the places are off the middle.
-
-    Returns
-    -------
-    texel : int32 [k, 3]
-        Chart, row and column, in a chart with its halo, of the first of the 3 x 3 texels.
-    offset : float32 [k, 2]
-        From the centre of the middle texel to the place, in rows and columns [texels].
-    """
-    place = np.stack([row, column], axis=1)
-    nearest = np.clip(np.floor(place + 0.5), 0, resolution - 1)
-    return np.column_stack([chart, nearest]).astype(np.int32), (place - nearest).astype(np.float32)
-
-
-@kernel(inline="always")
-def spline_weights(t: np.float32) -> tuple[np.float32, np.float32, np.float32]:
-    """Weights of three texels in a row at a place `t` [texels] from the centre of the middle one.
-
-    glsl/height_maps.glsl has the same weights for both axes.
-    """
-    half = np.float32(0.5)
-    return half * (half - t) * (half - t), np.float32(0.75) - t * t, half * (half + t) * (half + t)
-
-
-@kernel
-def spline_heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Floats32:
-    """Heights [k] of a height map [C, n + 2, n + 2, 4] at places given by `spline_samples`."""
-    height = np.empty(len(texel), np.float32)
-    for i in range(len(texel)):
-        # number by number: to unpack a row takes longer than all the rest
-        chart = texel[i, 0]
-        row = texel[i, 1]
-        column = texel[i, 2]
-        down = spline_weights(offset[i, 0])
-        across = spline_weights(offset[i, 1])
-        total = np.float32(0)
-        for j in range(3):
-            line = height_map[chart, row + j]
-            total += down[j] * (
-                across[0] * line[column, 3]
-                + across[1] * line[column + 1, 3]
-                + across[2] * line[column + 2, 3]
-            )
-        height[i] = total
-    return height
 
 
 class AdaptiveTessellation:
@@ -292,104 +243,3 @@ class DeviceTessellation:
                     shader["count"] = count
                 shader.run(-(-count // _GROUP))
                 ctx.memory_barrier()
-
-
-class Displacement:
-    """The vertices of a target on the GPU, and the pass that displaces them once a frame.
-
-    The pass also puts them into the world; its results are captured by transform feedback. The
-    mesh's own vertices come first, then the midpoints in use.
-
-    Parameters
-    ----------
-    mapped : float64 [n, 3]
-        Texture coordinates of all vertices.
-    layer : int
-        Of its height map.
-
-    Attributes
-    ----------
-    moved : moderngl.Buffer
-        vec4 a vertex: displaced, in the world [m], and the ambient visibility that nearby geoms
-        leave.
-    vertices : moderngl.Buffer
-        What `KEPT` says of each vertex.
-    """
-
-    # buffer, format and names of what is drawn with
-    KEPT = "8x4 3f 3f 2f 3f", "in_normal", "in_baked", "in_place", "in_mapped"
-
-    def __init__(
-        self,
-        resources: Resources,
-        vertices: SurfaceVertices,
-        mapped: NDArray[np.float64],
-        layer: int,
-    ) -> None:
-        own = vertices.attributes
-        self._base_count = len(own) - len(vertices.edges.ends)
-        columns = (
-            own[:, POSITION],
-            own[:, DIRECTION],
-            vertices.lookups,
-            own[:, NORMAL],
-            own[:, BAKED],
-        )
-        self._content = np.concatenate([*columns, vertices.places, mapped], axis=1).astype(
-            np.float32
-        )
-        self.vertices: moderngl.Buffer = resources.buffer(self._content.tobytes(), dynamic=True)
-        self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(own))
-        self._program = resources.program("surfaces/displacement", "moved")
-        self._program["layer"] = float(layer)
-        names = "in_position", "in_direction", "in_lookup"
-        self._pass = resources.vertex_array(
-            self._program, [(self.vertices, "3f 3f 2f 11x4", *names)]
-        )
-        # nothing is drawn, but OpenGL asks for a framebuffer
-        self._framebuffer = resources.framebuffer([resources.renderbuffer((1, 1))])
-        self._used: NDArray[np.int32] | None = None
-
-    def lay(self, mapped: NDArray[np.float64]) -> None:
-        """Replace the texture coordinates of all vertices, [n, 3]."""
-        self._content[:, -3:] = mapped
-        self.vertices.write(self._content[: self._base_count])
-        self._used = None
-
-    def move(
-        self, points: Floats32, directions: Floats32, normals: Floats32, baked: Floats32
-    ) -> None:
-        """Replace the points of all vertices at rest [m], their directions and more, [n, 3] each.
-
-        The directions are those of the displacement.
-        """
-        self._content[:, :6] = np.hstack([points, directions])
-        self._content[:, 8:14] = np.hstack([normals, baked])
-        self.vertices.write(self._content[: self._base_count])
-        self._used = None
-
-    def use(self, midpoints: NDArray[np.int32]) -> None:
-        """Let these vertices follow the mesh's own vertices in the buffer."""
-        if len(midpoints) and midpoints is not self._used:
-            rows = self._content[midpoints]
-            self.vertices.write(rows, offset=self._base_count * rows.strides[0])
-        self._used = midpoints
-        self._count = self._base_count + len(midpoints)
-
-    def run(
-        self, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: int
-    ) -> None:
-        """Displace all vertices that are in use; height maps and occluders are bound already.
-
-        Parameters
-        ----------
-        rotation, origin : float64 [3, 3], [3]
-            Of the target in the world [m].
-        occluders : int
-            Bits of the occluders near the target; see `Occluders.near`.
-        """
-        self._program["rotation"] = tuple(rotation.T.ravel())
-        self._program["origin"] = tuple(origin)
-        self._program["occluders_near"] = occluders
-        self._framebuffer.use()
-        self._pass.transform(self.moved, moderngl.POINTS, vertices=self._count)
