@@ -27,7 +27,7 @@ from ripple_sim.encode.replace import MARK
 from ripple_sim.encode.webp import riff_chunk
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import WaveSolver
-from ripple_sim.solver.backends.kernels import Probes
+from ripple_sim.solver.backends.probes import Probes
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.kernel import Floats, Ints

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ..operator.wave_operator import WaveOperator
 from .gl_fields import DeviceField
-from .kernels import Amplitude, Probes
+from .probes import Probes
+from .step_kernels import Amplitude
 from .surface_fields import SurfaceFields
 
 

@@ -12,8 +12,10 @@ from ..operator.deep_water import FluidOperator
 from ..operator.step import damped_step
 from ..operator.wave_operator import WaveOperator
 from .backend import TexelLoad
-from .cpu import RowLayout, all_finite
-from .kernels import Amplitude, Probes
+from .cpu import all_finite
+from .probes import Probes
+from .row_layout import RowLayout
+from .step_kernels import Amplitude
 from .surface_fields import SurfaceFields
 
 

@@ -31,7 +31,8 @@ from .gl_fields import (
     bind_buffers,
     to_buffer,
 )
-from .kernels import Amplitude, Probes
+from .probes import Probes
+from .step_kernels import Amplitude
 from .surface_fields import SurfaceFields
 
 # Constants of `cells` that the shader of a quad's stiffness needs

@@ -22,7 +22,8 @@ from ..operator.volume import VolumeRate
 from ..operator.wave_operator import WaveOperator
 from ..texels.stencil import IrregularLinks, Stencil
 from ..texels.topology import TexelTopology
-from .kernels import Amplitude, Probes
+from .probes import Probes
+from .step_kernels import Amplitude
 
 # Packages below which the shaders lie.
 _SOLVER_PACKAGE = "ripple_sim.solver"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..backends.backend import Backend
-from ..backends.kernels import Probes
+from ..backends.probes import Probes
 from ..errors import POSITIVE, SolverError, shown
 from ..operator.material import Material, frequency
 from ..operator.wave_operator import WaveOperator

@@ -69,7 +69,7 @@ def test_a_terminal_shows_title_and_frames_done(monkeypatch: pytest.MonkeyPatch,
 
 def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     told = terminal(monkeypatch)
-    kernels = "ripple_sim.solver.backends.kernels"
+    kernels = "ripple_sim.solver.backends.step_kernels"
     monkeypatch.setattr("ripple_sim.solver.compile_clock.compiling", lambda: kernels)
     times = {kernels: 11.6, "ripple_sim.solver.texels.stencil": 3.0}
     monkeypatch.setattr("ripple_sim.solver.compile_clock.compile_times", lambda: times)

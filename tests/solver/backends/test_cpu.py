@@ -8,7 +8,7 @@ from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Material, TexelMesh, texel_atlas
 from ripple_sim.solver.backends import CPUBackend, TexelLoad, advance
-from ripple_sim.solver.backends.kernels import Probes
+from ripple_sim.solver.backends.probes import Probes
 from ripple_sim.solver.operator import WaveOperator, build_operator
 from ripple_sim.solver.texels import stiffness_matrix
 
