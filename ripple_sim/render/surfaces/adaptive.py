@@ -1,4 +1,4 @@
-"""Adaptive tessellation: the edges of a target's mesh are split where the waves bend, frame by frame.
+"""Adaptive tessellation: edges of a target's mesh are split where the waves bend, frame by frame.
 
 Edges are split where the waves are computed: on the processor, from heights in its memory, or on
 the GPU, by compute shaders, from heights in a texture. Both give the same triangles in the same

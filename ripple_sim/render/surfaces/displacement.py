@@ -1,4 +1,4 @@
-"""`Displacement`: the vertices of a target on the GPU, displaced and put into the world once a frame."""
+"""`Displacement`: the vertices of a target on the GPU, displaced once a frame."""
 
 from __future__ import annotations
 
