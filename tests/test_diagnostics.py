@@ -17,7 +17,7 @@ from ripple_sim.cli import main as cli
 from ripple_sim.diagnostics import find_drawing_threads, find_problems
 from ripple_sim.solver.backends import auto_backend
 from ripple_sim.solver.errors import GLError
-from ripple_sim.solver.gl import context as gl
+from ripple_sim.solver.gl import context as gl, creation
 from ripple_sim.video import settings
 
 NOBODY = 65534
@@ -176,7 +176,7 @@ def test_without_egl_info_says_what_to_install(capsys, monkeypatch):
     """Every EGL library is missing, as on a machine without Mesa."""
     monkeypatch.setattr(gl, "_shared", {})
     monkeypatch.setattr(
-        gl, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},)
+        creation, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},)
     )
     with pytest.raises(GLError):
         gl.shared_context()

@@ -100,9 +100,9 @@ def descriptors() -> int:
 
 def objects() -> int:
     """How many buffers, textures, framebuffers, vertex arrays and programs of OpenGL there are."""
-    from ripple_sim.solver.gl import context, shared_context
+    from ripple_sim.solver.gl import current, shared_context
 
-    find = context.load_egl().eglGetProcAddress
+    find = current.load_egl().eglGetProcAddress
     find.restype = ctypes.c_void_p
     find.argtypes = [ctypes.c_char_p]
     with shared_context() as ctx:

@@ -1,66 +1,35 @@
-"""The OpenGL context: created here, entered here, checked here, and nowhere else.
+"""The OpenGL context: entered here, checked here, and nowhere else.
 
-`shared_context` gives the context of a device that the whole process shares. This module also finds
-out whether the driver is software, to which EGL falls back silently; it has fences, which moderngl
-lacks, to wait for the GPU without blocking other Python threads; and it keeps a pool of idle
-programs, since compiling a program takes as long as a frame.
-
-`load_shader` reads GLSL sources from packages, resolves their includes, and defines the constants
-that Python gives.
+`shared_context` gives the context of a device that the whole process shares. This module also has
+fences, which moderngl lacks, to wait for the GPU without blocking other Python threads; and it keeps
+a pool of idle programs, since compiling a program takes as long as a frame.
 """
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
-import functools
 import gc
-import importlib.resources
 import os
 import re
-import shutil
-import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from importlib.resources.abc import Traversable
-from pathlib import Path
 from typing import Any
 
 import moderngl
 
 from ..errors import GLError
-from .current import EGLCurrent, Restore, current_kept, leave_current, load_egl, release_current
+from .creation import COMPUTE, create_context, is_software
+from .current import Restore, replace_current
+from .shader_text import load_shader
 
 # The binding that a shader gives to a sampler or uniform block, and the name of the latter.
 _BOUND = re.compile(r"layout\((?:std140, )?binding = (\w+)\) uniform (?:\w+ )?(\w+)")
 
 # The part of such a declaration that GLSL before 4.2 does not have.
 _BINDING = re.compile(r"layout\(binding = \w+\) |, binding = \w+")
-
-# Words in GL_RENDERER that name a driver which renders on the processor.
-_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr", "software")
-
-# Names of the libraries that moderngl loads: its own names first, which packages with -dev symlinks
-# install; then the names that runtime packages install.
-_LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
-
-# Versions of OpenGL, times 100.
-COMPUTE = 430  # compute shaders need it
-RENDERING = 410  # rendering needs it
-_REPORTED = 330  # a driver with this version is named in the error that asks for a later one
-
-# Environment variable: the number of threads with which Mesa's llvmpipe draws; 0: none.
-DRAWING_THREADS = "LP_NUM_THREADS"
-
-# Environment variable of MuJoCo: number of the EGL device to draw on, where the program names none.
-_MUJOCO_DEVICE = "MUJOCO_EGL_DEVICE_ID"
-
-# EGL devices that are tried where nobody names one. A machine with more GPUs than this names one.
-_TRIED_DEVICES = 8
-
-_SHADER_CACHE_BYTES = 64e6  # room that Mesa's shader cache may need while a process runs
 
 # Constants of OpenGL for fences.
 _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
@@ -79,176 +48,8 @@ _TURN = 1e-3
 _PAUSE = 1e-4
 
 
-def load_shader(package: str, name: str, stage: str = "", **defines: object) -> str:
-    """Read a shader, resolve its includes, and put the defines behind `#version`.
-
-    Parameters
-    ----------
-    package : str
-        The package below which the shader and its included files lie.
-    name : str
-        Path of the file below the package, without `.glsl`: "passes/classify". A line `#include
-        "glsl/frame.glsl"` is replaced by that file, its path likewise relative to the package; a
-        file that was included before is not included again.
-    stage : str
-        Which of the shaders in the file, if there are several: lines behind `#stage vertex` belong
-        to the stage "vertex" only, up to the next such line. Lines before the first `#stage` belong
-        to all stages. The same holds for included files.
-    **defines
-        Constants, written as `#define NAME value` where the text has the name. GROUP is the number
-        of threads in a group of a compute shader; the group's layout is declared as well.
-
-    Raises
-    ------
-    GLError
-        If a file is missing, or the shader does not start with `#version`.
-    """
-    text = _read(importlib.resources.files(package), f"{name}.glsl", stage, set())
-    head, _, body = text.partition("\n")
-    if not head.startswith("#version"):
-        raise GLError(f"shader {name}.glsl of {package} must start with #version, found {head!r}")
-    # only names that occur: shaders that differ in other names alone have the same text, which is
-    # compiled once
-    used_names = set(re.findall(r"\w+", " ".join([body, *map(str, defines.values())])))
-    lines = ""
-    for key, value in defines.items():
-        if key in used_names:
-            lines += f"#define {key} {value}\n"
-    layout = f"layout(local_size_x = {defines['GROUP']}) in;\n" if "GROUP" in defines else ""
-    return f"{head}\n{lines}{layout}{body}"
-
-
-def _read(folder: Traversable, path: str, stage: str, seen: set[str]) -> str:
-    """Text of a file and its included files, as far as it belongs to a stage.
-
-    The text of a file that was `seen` before is empty.
-    """
-    if path in seen:
-        return ""
-    seen.add(path)
-    file = folder.joinpath(path)
-    if not file.is_file():
-        raise GLError(f"package {folder.name} has no shader {path}")
-    lines = []
-    belongs = True
-    for line in _lines(file):  # type: ignore[arg-type]  # a path can be hashed
-        if line.startswith("#stage"):
-            belongs = line.split()[1] == stage
-        elif belongs and line.startswith("#include"):
-            lines.append(_read(folder, line.split('"')[1], stage, seen))
-        elif belongs:
-            lines.append(line)
-    return "\n".join(lines) + "\n"
-
-
-@functools.cache  # a batch makes a renderer for every scene
-def _lines(file: Traversable) -> list[str]:
-    return file.read_text().splitlines()
-
-
-def is_software(renderer: str) -> bool:
-    """Whether a driver renders on the processor, by its GL_RENDERER."""
-    return any(word in renderer.lower() for word in _SOFTWARE)
-
-
-def _spare_full_disks() -> None:
-    """Switch Mesa's shader cache off where its disk is nearly full, or its folder cannot be made.
-
-    The cache is mapped into memory: a page without room on the disk kills the process. A folder
-    that cannot be made makes Mesa complain on standard error.
-    """
-    names = ("MESA_SHADER_CACHE_DIR", "MESA_GLSL_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
-    folder = Path(next((os.environ[name] for name in names if os.environ.get(name)), "/"))
-    with contextlib.suppress(OSError):
-        existing = next(path for path in (folder, *folder.parents) if path.exists())
-        is_full = shutil.disk_usage(existing).free < _SHADER_CACHE_BYTES
-        if is_full or not os.access(existing, os.W_OK):
-            os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
-
-
-def _draw_without_threads() -> None:
-    """Have Mesa's llvmpipe draw in the calling thread, unless the user set the number of threads.
-
-    llvmpipe reads the variable when its first context is made. One of its threads may unlock a
-    fence that another thread has freed: this writes into the program's memory, and glibc ends the
-    program ("corrupted unsorted chunks"). See docs/stability.md. Other drivers ignore the variable.
-    """
-    os.environ.setdefault(DRAWING_THREADS, "0")
-
-
-def create_context(device: int | None) -> moderngl.Context:
-    """Create a headless context: OpenGL 4.3, or else 4.1; raises GLError.
-
-    The context that is current in this thread stays current.
-
-    Without a `device`, the new context is on the device that the environment variable
-    MUJOCO_EGL_DEVICE_ID names, like MuJoCo's own renderer. Without the variable, it is on the first
-    device that yields a context.
-    """
-    if not sys.platform.startswith("linux"):
-        raise GLError(
-            f"no OpenGL over EGL on {sys.platform}, as rendering and 'gl' need; waves run with "
-            f"backend 'cpu'"
-        )
-    with current_kept():
-        return _create_current(device)
-
-
-def _device_of_environment() -> int | None:
-    """The device that the user has chosen for MuJoCo, or None."""
-    text = os.environ.get(_MUJOCO_DEVICE)
-    if text is None:
-        return None
-    try:
-        return int(text)
-    except ValueError:
-        raise GLError(
-            f"{_MUJOCO_DEVICE} must be the number of an EGL device, counted from 0, got {text!r}; "
-            "unset it to take the first that works"
-        ) from None
-
-
-def _create_current(device: int | None) -> moderngl.Context:
-    """Create a context like `create_context`, and leave it current."""
-    _spare_full_disks()
-    _draw_without_threads()
-    place = f"EGL device {device}"
-    if device is None and (device := _device_of_environment()) is not None:
-        place = f"EGL device {device}, which {_MUJOCO_DEVICE} names"
-    if device is not None and device < 0:
-        raise GLError(f"there is no {place}; devices are counted from 0")
-    devices = range(_TRIED_DEVICES) if device is None else [device]
-    reason = "no device"
-    # a driver may give exactly the version that is asked for: the highest is asked for first
-    for version in (COMPUTE, RENDERING, _REPORTED):
-        for libraries in _LIBRARIES:
-            for index in devices:
-                # not in its hints
-                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
-                try:
-                    ctx = moderngl.create_context(require=version, standalone=True, **settings)
-                except Exception as error:  # moderngl raises bare Exception here
-                    reason = str(error)
-                    if "not loaded" in reason:
-                        break
-                    continue
-                if version >= RENDERING:
-                    return ctx
-                raise GLError(
-                    f"{ctx.info['GL_RENDERER']} has OpenGL {ctx.version_code / 100:.1f}; rendering "
-                    f"needs 4.1 or later, "
-                    "backend 'gl' 4.3: update the driver, or take Mesa's llvmpipe "
-                    "(LIBGL_ALWAYS_SOFTWARE=1); waves "
-                    "alone run with backend 'cpu'"
-                )
-    if device is not None:
-        raise GLError(f"no OpenGL 4.1 context on {place} ({reason}); devices are counted from 0")
-    advice = "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
-    raise GLError(f"no OpenGL 4.1 context on any EGL device ({reason}); {advice}")
-
-
 class GLContext:
-    """One headless OpenGL context on EGL, shared by the GPU wave solver and the renderer.
+    """One headless OpenGL context, shared by the GPU wave solver and the renderer.
 
     Use it as a context manager. Entering makes the context current, frees discarded objects, and
     returns the `moderngl.Context`. Leaving the outermost block makes the program's own context
@@ -268,7 +69,7 @@ class GLContext:
     Raises
     ------
     GLError
-        If no EGL device gives an OpenGL 4.1 core context; at entering, if the context was lost, if
+        If there is no OpenGL 4.1 core context; at entering, if the context was lost, if
         another thread does not leave it, or in a process that was forked.
     """
 
@@ -277,7 +78,7 @@ class GLContext:
         self._lock = threading.RLock()
         self._owner = ""  # name of the thread that has entered
         self._depth = 0  # number of its nested `with` blocks
-        self._restore: Restore = release_current
+        self._restore: Restore | None = None  # makes the program's own context current again
         self._collected_before = True  # whether Python's garbage collector was on before entering
         # batches of objects to free
         self._discarded: deque[list[Any]] = deque()
@@ -286,38 +87,32 @@ class GLContext:
         self._idle: dict[int, Any] = {}
         # of all programs: the sources, and the uniforms after compilation
         self._programs: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
-        with current_kept():
-            self._ctx = create_context(device)
-            self._ctx.__enter__()
-            self._find_driver()
-
-    def _find_driver(self) -> None:
-        """Read the properties of the new context, which is current."""
-        own = EGLCurrent.of_thread()
-        if own is None:
-            raise GLError(
-                "a new OpenGL context does not become current in this thread; see `ripple-sim info`"
-            )
-        self._current = own
+        created = create_context(device)
+        self._ctx = created.ctx
+        self._current = created.current
+        self.renderer: str = created.info["GL_RENDERER"]
+        self.vendor: str = created.info["GL_VENDOR"]
+        self.version: str = created.info["GL_VERSION"]
+        self.computes = self._ctx.version_code >= COMPUTE
+        self._find_fences(created.address_of)
         # moderngl's objects wait in `objects` once they are collected
         self._ctx.gc_mode = "context_gc"
-        self._no_framebuffer = self._ctx.detect_framebuffer(0)
-        info = self._ctx.info
-        self.renderer: str = info["GL_RENDERER"]
-        self.vendor: str = info["GL_VENDOR"]
-        self.version: str = info["GL_VERSION"]
-        self.computes = self._ctx.version_code >= COMPUTE
-        # fences, which moderngl lacks; ctypes lets go of the interpreter's lock while they are
-        # waited for
+        with self as ctx:
+            self._no_framebuffer = ctx.detect_framebuffer(0)
+
+    def _find_fences(self, address_of: Callable[[str], int]) -> None:
+        """Find OpenGL's fences, which moderngl lacks.
+
+        ctypes lets go of the interpreter's lock while a fence is waited for.
+        """
         pointer = ctypes.c_void_p
         number = ctypes.c_uint
-        address = load_egl().eglGetProcAddress
-        self._create_fence = ctypes.CFUNCTYPE(pointer, number, number)(address(b"glFenceSync"))
+        self._create_fence = ctypes.CFUNCTYPE(pointer, number, number)(address_of("glFenceSync"))
         self._client_wait = ctypes.CFUNCTYPE(number, pointer, number, ctypes.c_uint64)(
-            address(b"glClientWaitSync")
+            address_of("glClientWaitSync")
         )
-        self._flush = ctypes.CFUNCTYPE(None)(address(b"glFlush"))
-        self._delete_fence = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
+        self._flush = ctypes.CFUNCTYPE(None)(address_of("glFlush"))
+        self._delete_fence = ctypes.CFUNCTYPE(None, pointer)(address_of("glDeleteSync"))
 
     @property
     def software(self) -> bool:
@@ -390,29 +185,36 @@ class GLContext:
         """Make the context current, and free discarded objects."""
         self._owner = threading.current_thread().name
         if self._current.is_current():  # Ctrl-C left it current: other threads could not enter
-            release_current()
-        self._restore = leave_current()
+            self._current.leave()
         # finalizers of other libraries would leave the context at any line: those of MuJoCo call
         # eglReleaseThread
         self._collected_before = gc.isenabled()
         gc.disable()
         try:
-            if not self._current.make_current():
-                raise GLError(
-                    f"the OpenGL context on {self.renderer} is lost; something else in this "
-                    f"process has shut EGL "
-                    "down (a pyvista or VTK window does): run one of the two in a process of its "
-                    "own"
-                )
+            self._take_current()
             self._free_discarded()
         except BaseException:
             self._leave()
             raise
 
+    def _take_current(self) -> None:
+        """Make the context current; raise `GLError` if it is lost."""
+        restore = replace_current(self._current)
+        if restore is None:
+            raise GLError(
+                f"the OpenGL context on {self.renderer} is lost; something else in this process "
+                "has shut EGL down (a pyvista or VTK window does): run one of the two in a "
+                "process of its own"
+            )
+        self._restore = restore
+
     def _leave(self) -> None:
         """Make the program's own context current again."""
+        restore = self._restore
+        self._restore = None
         try:
-            self._restore()
+            if restore is not None:
+                restore()
         finally:
             if self._collected_before:
                 gc.enable()

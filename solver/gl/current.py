@@ -13,7 +13,7 @@ import functools
 import os
 import sys
 from collections.abc import Callable, Iterator
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from ..errors import GLError
 
@@ -50,6 +50,29 @@ def load_egl() -> ctypes.CDLL:
     return egl
 
 
+@functools.cache
+def egl_exists() -> bool:
+    """Whether there is a library of EGL; macOS and Windows have none."""
+    try:
+        load_egl()
+    except GLError:
+        return False
+    return True
+
+
+class Current(Protocol):
+    """A context of ours, and how it becomes current."""
+
+    def make_current(self) -> bool:
+        """Make the context current in this thread; return whether it is."""
+
+    def is_current(self) -> bool:
+        """Whether the context is current in this thread, as far as the platform tells."""
+
+    def leave(self) -> None:
+        """Leave this thread without this context, so that another thread may take it."""
+
+
 class EGLCurrent(NamedTuple):
     """A context of EGL, its display, and the surfaces that it draws to and reads from, or 0."""
 
@@ -76,25 +99,99 @@ class EGLCurrent(NamedTuple):
         """Whether the context is current in this thread."""
         return current_context() == self.context
 
+    def leave(self) -> None:
+        """Leave this thread without a current EGL context."""
+        release_current()
+
+
+class GLXCurrent(NamedTuple):
+    """A context of GLX, its display, and the drawables that it draws to and reads from."""
+
+    display: int
+    draw: int
+    read: int
+    context: int
+
+    @classmethod
+    def of_thread(cls) -> GLXCurrent | None:
+        """The context that is current in this thread, or None."""
+        glx = _load_glx()
+        if glx is None or not (context := glx.glXGetCurrentContext()):
+            return None
+        return cls(
+            display=glx.glXGetCurrentDisplay(),
+            draw=glx.glXGetCurrentDrawable(),
+            read=glx.glXGetCurrentReadDrawable(),
+            context=context,
+        )
+
+    def make_current(self) -> bool:
+        """Make the context current in this thread; return whether it is."""
+        glx = _load_glx()
+        return glx is not None and bool(glx.glXMakeContextCurrent(*self)) and self.is_current()
+
+    def is_current(self) -> bool:
+        """Whether the context is current in this thread."""
+        current = GLXCurrent.of_thread()
+        return current is not None and current.context == self.context
+
+    def leave(self) -> None:
+        """Leave this thread without a current GLX context."""
+        glx = _load_glx()
+        if glx is not None:
+            glx.glXMakeContextCurrent(self.display, 0, 0, None)
+
+
+class PlatformCurrent:
+    """A context of CGL or WGL, which moderngl makes current and leaves.
+
+    Parameters
+    ----------
+    context : object
+        Of the package glcontext. It makes the context that was current before current again.
+    """
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+        self._is_current = True  # as every new context
+
+    def make_current(self) -> bool:
+        """Make the context current in this thread; return whether it is."""
+        self._context.__enter__()
+        self._is_current = True
+        return True
+
+    def is_current(self) -> bool:
+        """Whether the context is current, if nothing but this object changed what is current."""
+        return self._is_current
+
+    def leave(self) -> None:
+        """Make the context current that was current before."""
+        self._context.__exit__()
+        self._is_current = False
+
 
 def current_context() -> int | None:
     """Handle of the EGL context that is current in this thread; None if there is none."""
-    return load_egl().eglGetCurrentContext()
+    return load_egl().eglGetCurrentContext() if egl_exists() else None
 
 
 def release_current() -> None:
-    """Leave this thread without a current EGL context, so that another thread may take it."""
-    egl = load_egl()
-    egl.eglMakeCurrent(egl.eglGetCurrentDisplay(), None, None, None)
+    """Leave this thread without a current context of EGL or GLX: another thread may take it."""
+    if egl_exists():
+        egl = load_egl()
+        egl.eglMakeCurrent(egl.eglGetCurrentDisplay(), None, None, None)
+    window = GLXCurrent.of_thread()
+    if window is not None:
+        window.leave()
 
 
 def leave_current() -> Restore:
-    """Leave the context that is current in this thread, so that an EGL context can be made current.
+    """Leave the context that is current in this thread, so that one of ours can be made current.
 
-    The returned function makes the context current again, in place of the EGL context that is then
-    current.
+    The returned function makes the context current again, in place of ours.
     """
-    previous = EGLCurrent.of_thread()
+    previous = EGLCurrent.of_thread() if egl_exists() else None
     if previous is None:
         return _leave_glx() or _leave_osmesa() or release_current
 
@@ -105,21 +202,32 @@ def leave_current() -> Restore:
     return restore  # EGL itself replaces one context by another
 
 
+def replace_current(ours: Current) -> Restore | None:
+    """Make a context of ours current; None where it is lost.
+
+    The returned function makes the context current again that was current before.
+    """
+    if isinstance(ours, PlatformCurrent):
+        ours.make_current()
+        return ours.leave
+    restore = leave_current()
+    if not ours.make_current():
+        restore()
+        return None
+    return restore
+
+
 @contextlib.contextmanager
 def current_kept() -> Iterator[None]:
     """Make the context that is current when the block begins current again at the end."""
-    try:
-        egl = load_egl()
-    except GLError:  # without the library no EGL context can be made
-        yield
-        return
-    api = egl.eglQueryAPI()
+    api = load_egl().eglQueryAPI() if egl_exists() else None
     restore = leave_current()
     try:
         yield
     finally:
         restore()
-        egl.eglBindAPI(api)  # a thread's next EGL contexts are of this kind
+        if api is not None:
+            load_egl().eglBindAPI(api)  # a thread's next EGL contexts are of this kind
 
 
 @functools.cache
@@ -137,17 +245,14 @@ def _load_glx() -> ctypes.CDLL | None:
 
 def _leave_glx() -> Restore | None:
     """Leave a window's context; None if none is current."""
-    glx = _load_glx()
-    if glx is None or not (context := glx.glXGetCurrentContext()):
+    previous = GLXCurrent.of_thread()
+    if previous is None:
         return None
-    display = glx.glXGetCurrentDisplay()
-    draw = glx.glXGetCurrentDrawable()
-    read = glx.glXGetCurrentReadDrawable()
-    glx.glXMakeContextCurrent(display, 0, 0, None)
+    previous.leave()
 
     def restore() -> None:
         release_current()
-        glx.glXMakeContextCurrent(display, draw, read, context)
+        previous.make_current()
 
     return restore
 

@@ -142,3 +142,38 @@ def test_waves_in_compute_shaders_are_refused_and_auto_takes_the_cpu(mesa: None)
     assert done.stderr.splitlines()[-1].endswith(
         "has OpenGL 4.1; backend 'gl' needs 4.3: take backend 'cpu'"
     )
+
+
+# Frames of `test_versions.drawn` without EGL's library, drawn in another thread than the one that
+# made the context. A display of X11 gives GLX.
+WITHOUT_EGL = """
+import os, sys, threading
+import numpy as np
+sys.path[:0] = sys.argv[2:]
+from ripple_sim.solver.gl import creation, current, shared_context
+creation.egl_exists = current.egl_exists = lambda: False
+gl = shared_context()
+assert type(gl._current) is current.GLXCurrent
+assert current.GLXCurrent.of_thread() is None  # left again
+import test_versions
+frames = []
+thread = threading.Thread(target=lambda: frames.extend(test_versions.drawn()))
+thread.start()
+thread.join()
+np.savez(sys.argv[1], *frames)
+"""
+
+
+def test_frames_of_glx_are_those_of_egl(opengl: None, screen: str, tmp_path: Path) -> None:
+    done = ended(
+        "-c",
+        WITHOUT_EGL,
+        tmp_path / "frames.npz",
+        Path(__file__).parent,
+        *sys.path,
+        env={**os.environ, "DISPLAY": screen},
+    )
+    assert done.returncode == 0, done.stderr
+    with np.load(tmp_path / "frames.npz") as frames:
+        for number, frame in enumerate(drawn()):
+            np.testing.assert_array_equal(frames[f"arr_{number}"], frame)

@@ -20,6 +20,7 @@ from ripple_sim.solver import GLError, Material, WaveSolver, sphere_atlas
 from ripple_sim.solver.gl import (
     GLContext,
     create_context,
+    creation,
     current_context,
     is_software,
     load_shader,
@@ -66,9 +67,9 @@ def test_lost_context_is_reported(opengl: None) -> None:
     script = """
         import ctypes, sys
         from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
-        from ripple_sim.solver.gl import context, shared_context
+        from ripple_sim.solver.gl import current, shared_context
         waves = WaveSolver(sphere_atlas(1.0, 8), backend="gl")
-        library = context.load_egl()
+        library = current.load_egl()
         for function in (library.eglGetCurrentDisplay, library.eglGetPlatformDisplay):
             function.restype = ctypes.c_void_p
         with shared_context():
@@ -184,7 +185,7 @@ def test_the_device_that_the_user_has_chosen_for_mujoco_is_ours_too(
         "moderngl.create_context", lambda **settings: made.append(settings) or create(**settings)
     )
     monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", "0")
-    create_context(None).release()
+    create_context(None).ctx.release()
     assert [settings["device_index"] for settings in made] == [0]
     monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", "99")
     with pytest.raises(
@@ -192,7 +193,7 @@ def test_the_device_that_the_user_has_chosen_for_mujoco_is_ours_too(
         match=r"EGL device 99, which MUJOCO_EGL_DEVICE_ID names \(.+\); devices are counted",
     ):
         GLContext()
-    create_context(0).release()  # what the program asks for comes first
+    create_context(0).ctx.release()  # what the program asks for comes first
 
 
 @pytest.mark.parametrize("value", ["", "gpu", "1.5"])
@@ -275,9 +276,17 @@ def test_a_driver_that_is_too_old_is_named_with_its_version_and_the_one_needed(
 
 
 @pytest.mark.parametrize("system", ["darwin", "win32"])
-def test_a_system_without_egl_is_named(system: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_system_that_has_no_context_is_told_what_runs(
+    system: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("sys.platform", system)
-    with pytest.raises(GLError, match=rf"no OpenGL over EGL on {system}.*backend 'cpu'"):
+    monkeypatch.setattr(creation, "egl_exists", lambda: False)
+
+    def no_context(**settings: object) -> None:
+        raise RuntimeError("no pixel format")
+
+    monkeypatch.setattr("glcontext.default_backend", lambda: no_context)
+    with pytest.raises(GLError, match=r"\(no pixel format\); waves alone run with backend 'cpu'"):
         create_context(None)
 
 
@@ -415,7 +424,7 @@ def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full_or_not_ours(
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=free))
     monkeypatch.setattr("os.access", lambda *_: ours)
     monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)
-    create_context(None).release()
+    create_context(None).ctx.release()
     assert os.environ.get("MESA_SHADER_CACHE_DISABLE") == expected
     monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)
 

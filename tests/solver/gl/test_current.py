@@ -24,7 +24,7 @@ def test_a_program_keeps_its_context_and_surfaces_where_ours_is_made_and_entered
         with ours, ours:
             assert current_context() not in (None, own.context)
         assert EGLCurrent.of_thread() == own
-        create_context(None).release()
+        create_context(None).ctx.release()
         assert EGLCurrent.of_thread() == own
         with pytest.raises(GLError):
             create_context(99)
@@ -61,7 +61,7 @@ def test_a_thread_creates_the_kind_of_contexts_that_it_did_before(opengl: None) 
     before = egl.eglQueryAPI()
     egl.eglBindAPI(embedded)
     try:
-        create_context(None).release()
+        create_context(None).ctx.release()
         assert egl.eglQueryAPI() == embedded
     finally:
         egl.eglBindAPI(before)
