@@ -1,8 +1,8 @@
 """The OpenGL context: entered here, checked here, and nowhere else.
 
 `shared_context` gives the context of a device that the whole process shares. This module also has
-fences, which moderngl lacks, to wait for the GPU without blocking other Python threads; and it keeps
-a pool of idle programs, since compiling a program takes as long as a frame.
+fences, which moderngl lacks, to wait for the GPU without blocking other Python threads; and it
+keeps a pool of idle programs, since compiling a program takes as long as a frame.
 """
 
 from __future__ import annotations

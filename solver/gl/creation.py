@@ -1,4 +1,4 @@
-"""A new headless OpenGL context: on EGL, or on the platform's own window system where EGL is missing.
+"""A new headless OpenGL context: on EGL, or of the platform's own window system without EGL.
 
 EGL needs no display, and names the device. Without it, as on macOS and Windows, the context is
 moderngl's own choice: CGL, WGL, or GLX on a display of X11.
@@ -112,8 +112,8 @@ def _has_display() -> bool:
 def _spare_full_disks() -> None:
     """Switch Mesa's shader cache off where its disk is nearly full, or its folder cannot be made.
 
-    The cache is mapped into memory: a page without room on the disk kills the process. A folder that
-    cannot be made makes Mesa complain on standard error.
+    The cache is mapped into memory: a page without room on the disk kills the process. A folder
+    that cannot be made makes Mesa complain on standard error.
     """
     names = ("MESA_SHADER_CACHE_DIR", "MESA_GLSL_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
     folder = Path(next((os.environ[name] for name in names if os.environ.get(name)), "/"))
@@ -127,9 +127,9 @@ def _spare_full_disks() -> None:
 def _draw_without_threads() -> None:
     """Have Mesa's llvmpipe draw in the calling thread, unless the user set the number of threads.
 
-    llvmpipe reads the variable when its first context is made. One of its threads may unlock a fence
-    that another thread has freed: this writes into the program's memory, and glibc ends the program
-    ("corrupted unsorted chunks"). See docs/stability.md. Other drivers ignore the variable.
+    llvmpipe reads the variable when its first context is made. One of its threads may unlock a
+    fence that another thread has freed: this writes into the program's memory, and glibc ends the
+    program ("corrupted unsorted chunks"). See docs/stability.md. Other drivers ignore the variable.
     """
     os.environ.setdefault(DRAWING_THREADS, "0")
 
