@@ -71,6 +71,9 @@ parse_seed = _reader(_whole, lambda number: True, "a whole number, 0 or more")
 parse_seconds = _reader(
     float, lambda seconds: 0 < seconds < math.inf, "a positive number of seconds"
 )
+parse_time = _reader(
+    float, lambda seconds: 0 <= seconds < math.inf, "a number of seconds, 0 or more"
+)
 parse_factor = _reader(float, lambda factor: 0 < factor < math.inf, "a positive number, such as 4")
 parse_angle = _reader(
     float, lambda angle: 0 <= angle <= 360, "an angle from 0 to 360 degrees, such as 180"
@@ -92,6 +95,16 @@ def parse_focus(word: str) -> float | str:
     except ValueError:
         return word
     return word if math.isnan(distance) else distance
+
+
+def parse_height_colors(word: str) -> float | str:
+    """Read "auto", or a height [m]."""
+    if word == "auto":
+        return word
+    read = _reader(
+        float, lambda metres: 0 < metres < math.inf, "auto, or a positive number of metres"
+    )
+    return read(word)
 
 
 def parse_overlay(word: str) -> tuple[str, ...]:
@@ -137,6 +150,12 @@ Duration = Annotated[
     float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")
 ]
 CameraName = Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")]
+Time = Annotated[
+    float | None, _one_word(parse_time, "S"), arg(help_behavior_hint="(default: the end)")
+]
+HeightColors = Annotated[
+    Any, _one_word(parse_height_colors, "auto|M"), arg(help_behavior_hint="(optional)")
+]
 Resolution = Annotated[
     int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")
 ]

@@ -74,13 +74,16 @@ class ExportCommand(_SceneCommand, ExportOptions):
     fps: arguments.Count = ExportOptions.fps
     triangles: arguments.Count = ExportOptions.triangles
     chunk: arguments.Limit = ExportOptions.chunk
+    time: arguments.Time = ExportOptions.time
+    height_colors: arguments.HeightColors = ExportOptions.height_colors
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
     """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB
     ...). Bodies drop on a mesh."""
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """Output file. Its ending chooses the format: .usdc, .usda or .usdz (the moving scene), .html
     (a player), .zarr (fields over time), .csv or .parquet (impulses, or signals), .wav (signals, or
-    sound)."""
+    sound), .ply (the rippling surfaces at one time), .glb (the scene at one time), .meshes (a
+    folder of meshes, one a frame)."""
     seed: arguments.SceneSeed = None
     """Seed of the scene's random variation, or of the bodies that drop on a mesh."""
 
@@ -94,7 +97,12 @@ class ExportCommand(_SceneCommand, ExportOptions):
             **{each.name: getattr(self, each.name) for each in dataclasses.fields(ExportOptions)}
         )
         check_options(options)  # before anything that takes time
-        check_export(self.output, options.overwrite)
+        check_export(
+            self.output,
+            options.overwrite,
+            timed=options.time is not None,
+            colored=options.height_colors is not None,
+        )
 
         from ripple_sim.export.exporter import export_scene
         from ripple_sim.video.settings import frame_count
@@ -106,7 +114,8 @@ class ExportCommand(_SceneCommand, ExportOptions):
             summary = export_scene(scene, self.output, options, progress=progress)
         size = summary.output.stat().st_size if summary.output.is_file() else 0
         print(
-            f"{summary.output}: {summary.frames} frames{f', {size / 1e6:.1f} MB' if size else ''}\n"
+            f"{summary.output}: {summary.frames} {'frame' if summary.frames == 1 else 'frames'}"
+            f"{f', {size / 1e6:.1f} MB' if size else ''}\n"
             f"stages    simulation {summary.simulate_seconds:.1f} s, writing "
             f"{summary.write_seconds:.1f} s"
         )

@@ -8,7 +8,7 @@ import html
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
 import mujoco
 
@@ -20,13 +20,13 @@ from ripple_sim.encode.part import Settings
 from ripple_sim.errors import EncodingError, ExportError
 from ripple_sim.render.visuals.visual import find_look, paint_of
 from ripple_sim.scene.camera_entry import CameraEntry, check_camera
-from ripple_sim.scene.scene import Scene, through_camera
+from ripple_sim.scene.scene import Scene, check_duration, through_camera
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
 from ripple_sim.video.settings import frame_count, origin
 
-from .options import MOST_TRIANGLES, ExportOptions
-from .place import Unfinished, check_export, check_options, check_written
+from .options import HEIGHT_COLORS, MOST_TRIANGLES, ExportOptions
+from .place import Unfinished, check_export, check_mesh_format, check_options, check_written
 from .source import Source
 
 _PAGE_HEIGHT = 420  # of a page within a notebook [pixels]
@@ -45,7 +45,9 @@ class Exporter:
     ripples : Ripples
         Whose targets are written with their ripples.
     output : path
-        Its ending decides the format: .usdc, .usda, .usdz, .html, .zarr, .csv, .parquet or .wav.
+        Its ending decides the format: .usdc, .usda, .usdz, .html, .zarr, .csv, .parquet or .wav;
+        .ply (the rippling surfaces) or .glb (the scene) as it is at the latest frame; .meshes, a
+        folder with such a file for each frame.
     fps : float
         Frames per second of the file.
     camera : str or CameraEntry, optional
@@ -70,6 +72,11 @@ class Exporter:
     replay : bool
         Write a page that plays recorded heights. By default a page solves the waves itself
         wherever it can, so that its surfaces can be poked.
+    mesh_format : str
+        "ply" or "glb", of the files in a folder of meshes.
+    height_colors : float or "auto", optional
+        Colour the surfaces in meshes by height, from blue to red: height at which the colours end
+        [m], or "auto", the greatest in each file.
     overwrite : bool
         Replace a file that ripple-sim has not made.
 
@@ -91,6 +98,7 @@ class Exporter:
         output=PATH,
         fps=POSITIVE,
         ripples=instance(Ripples, ", for instance Ripples(model, materials)"),
+        height_colors=HEIGHT_COLORS,
     )
     def __init__(
         self,
@@ -108,12 +116,15 @@ class Exporter:
         limit: bool = True,
         chunk: int | None = None,
         replay: bool = False,
+        mesh_format: Literal["ply", "glb"] = "ply",
+        height_colors: float | Literal["auto"] | None = None,
         overwrite: bool = False,
     ) -> None:
         model = own_model(model)
         check_targets(model, ripples.model, ripples.geom_ids)
         named = by_name(model, looks or {}, "looks")
         check_written(size, tessellation, triangles, chunk)
+        check_mesh_format(mesh_format)
         for look in named.values():
             find_look(look)
         paints = {
@@ -133,6 +144,8 @@ class Exporter:
             chunk=chunk or 0,
             output=Path(output),
             replay=replay,
+            mesh_format=mesh_format,
+            height_colors=height_colors,
         )
         self._begin(source, output, overwrite)
 
@@ -148,7 +161,12 @@ class Exporter:
         self.output = Path(output)
         self.frames = 0
         self._source = source
-        ending = check_export(self.output, overwrite, chunked=source.chunk > 0)
+        ending = check_export(
+            self.output,
+            overwrite,
+            chunked=source.chunk > 0,
+            colored=source.height_colors is not None,
+        )
         with self._reported():
             self._place: Unfinished | None = Unfinished(self.output, ending.made_here, overwrite)
             try:
@@ -324,7 +342,13 @@ def export_scene(
     """
     adopt_warnings()
     check_options(options)
-    check_export(Path(output), options.overwrite, chunked=options.chunk is not None)
+    ending = check_export(
+        Path(output),
+        options.overwrite,
+        chunked=options.chunk is not None,
+        timed=options.time is not None,
+        colored=options.height_colors is not None,
+    )
     scene = through_camera(scene, options.camera)
     frames = frame_count(options, scene)
     simulation = Simulation.of(scene, options, on_step=on_step)
@@ -335,6 +359,11 @@ def export_scene(
     simulate_seconds = 0.0
     write_seconds = 0.0
     source = scene_source(scene, simulation, options)
+    if ending.one_time:
+        time_shown = options.time
+        if time_shown is None:
+            time_shown = frames / options.rate
+        return _export_moment(simulation, source, Path(output), options, time_shown, progress)
     if options.chunk is not None:
         settings: Settings = {
             "the number of frames": frames,
@@ -367,6 +396,31 @@ def export_scene(
     return ExportSummary(Path(output), frames, simulate_seconds, write_seconds)
 
 
+def _export_moment(
+    simulation: Simulation,
+    source: Source,
+    output: Path,
+    options: ExportOptions,
+    moment: float,
+    progress: Callable[[int, int], None] | None,
+) -> ExportSummary:
+    """Simulate up to a moment [s], to within half a physics step, and write it."""
+    check_duration(moment, 1.0)
+    whole_frames = int(moment * options.rate * (1 + 1e-12))
+    start = time.perf_counter()
+    with Exporter.of(source, output, options.overwrite) as exporter:
+        for number in range(whole_frames):
+            simulation.advance_frame()
+            if progress is not None:
+                progress(number + 1, whole_frames)
+        remaining = (moment - whole_frames / options.rate) / simulation.model.opt.timestep
+        for _ in range(round(remaining)):
+            simulation.step()
+        done = time.perf_counter()
+        exporter.write(simulation.data)
+    return ExportSummary(output, 1, done - start, time.perf_counter() - done)
+
+
 def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -> Source:
     """The source of an export of a scene."""
     return Source(
@@ -384,4 +438,6 @@ def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -
         sensors={} if options.sound else simulation.sensors,
         signals=options.signals,
         replay=options.replay,
+        mesh_format=options.mesh_format,
+        height_colors=options.height_colors,
     )

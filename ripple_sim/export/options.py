@@ -10,11 +10,17 @@ import dataclasses
 from typing import Literal
 
 from ripple_sim.errors import ExportError
-from ripple_sim.solver.errors import check_fields, whole
+from ripple_sim.solver.errors import POSITIVE, Valid, check_fields, is_finite, whole
 from ripple_sim.video.options import IN_ANY_CASE, SceneOptions
 
 TESSELLATIONS = ("refined", "own")
+MESH_FORMATS = ("ply", "glb")
 MOST_TRIANGLES = 100_000  # of a refined surface, about, by default
+
+HEIGHT_COLORS = Valid(
+    lambda limit: limit is None or limit == "auto" or POSITIVE.holds(limit),
+    "'auto', or a number of metres greater than 0",
+)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -32,6 +38,13 @@ class ExportOptions(SceneOptions):
     """Triangles of rippling surfaces: as fine as their texels, or the object's own."""
     triangles: int = MOST_TRIANGLES
     """About how many triangles a refined surface may have; a page has at most 16,000."""
+    time: float | None = None
+    """Second of the scene that a .ply or .glb shows. By default the end."""
+    mesh_format: Literal["ply", "glb"] = "ply"
+    """Format of the files in a folder NAME.meshes."""
+    height_colors: float | Literal["auto"] | None = None
+    """Colour rippling surfaces by height in meshes, from blue to red: metres at which the colours end, or
+    auto, the greatest height in each file."""
     signals: bool = False
     """Write the samples of the scene's sensors, in place of impulses (.csv, .parquet)."""
     sound: bool = False
@@ -45,4 +58,12 @@ class ExportOptions(SceneOptions):
     """Keep the complete chunks of an interrupted export of the same scene with the same options."""
 
     def __post_init__(self) -> None:
-        check_fields(ExportError, self, triangles=whole(1), chunk=whole(1), **IN_ANY_CASE)
+        check_fields(
+            ExportError,
+            self,
+            triangles=whole(1),
+            chunk=whole(1),
+            time=Valid(lambda time: is_finite(time) and time >= 0, "0 s or more"),
+            height_colors=HEIGHT_COLORS,
+            **IN_ANY_CASE,
+        )

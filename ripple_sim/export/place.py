@@ -20,7 +20,7 @@ from ripple_sim.errors import EncodingError, ExportError
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import NO_NAME, final_path
 
-from .options import TESSELLATIONS, ExportOptions
+from .options import MESH_FORMATS, TESSELLATIONS, ExportOptions
 from .source import Source, Writer
 
 Recognised = Callable[[Path], bool]
@@ -114,6 +114,10 @@ class Ending:
         Package that the writer needs, and the extra of ripple-sim that installs it.
     chunks : bool
         Whether a run can be divided over files.
+    meshes : bool
+        Whether the files are meshes, whose surfaces may have the colours of their heights.
+    one_time : bool
+        Whether a file shows one time alone.
     """
 
     home: str
@@ -121,6 +125,8 @@ class Ending:
     package: str | None = None
     extra: str | None = None
     chunks: bool = False
+    meshes: bool = False
+    one_time: bool = False
 
     def writer(self, source: Source, path: Path) -> Writer:
         """Begin a file."""
@@ -132,6 +138,7 @@ class Ending:
 
 
 _LAYER = Ending(".usd", "UsdWriter", package="pxr", extra="usd", chunks=True)
+_MESH = Ending(".mesh_files", "MeshWriter", meshes=True, one_time=True)
 ENDINGS = {
     ".usdc": _LAYER,
     ".usda": _LAYER,
@@ -141,6 +148,9 @@ ENDINGS = {
     ".csv": Ending(".tables", "CsvWriter"),
     ".parquet": Ending(".tables", "ParquetWriter", package="pyarrow", extra="parquet"),
     ".wav": Ending(".wav", "WavWriter"),
+    ".ply": _MESH,
+    ".glb": _MESH,
+    ".meshes": Ending(".mesh_files", "MeshFolderWriter", meshes=True),
 }
 
 
@@ -164,26 +174,44 @@ def ending_of(path: Path) -> Ending:
     return ending
 
 
-def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Ending:
+def check_export(
+    path: Path,
+    overwrite: bool,
+    *,
+    chunked: bool = False,
+    timed: bool = False,
+    colored: bool = False,
+) -> Ending:
     """Check that an export can be written to a path, and return how; leave no file.
 
     Call it before anything that takes time.
 
+    Parameters
+    ----------
+    path : Path
+    overwrite : bool
+    chunked, timed, colored : bool
+        Whether the files are to be chunks of a run, show one time of it, or have the colours of
+        heights.
+
     Raises
     ------
     ExportError
-        If the ending is unknown, needs what is not installed, has no chunks where they are wanted,
-        or is another where a link leads; something foreign stands in the path's place, or there can
-        be no such name.
+        If the ending is unknown, needs what is not installed, cannot be what is asked for, or is
+        another where a link leads; something foreign stands in the path's place, or there can be no
+        such name.
     EncodingError
         If nothing can be written there.
     """
     ending = ending_of(path)
-    if chunked and not ending.chunks:
-        able = " and ".join(suffix for suffix, other in ENDINGS.items() if other.chunks)
-        raise ExportError(
-            f"there are chunks of {able} files alone, not of {path.name}; leave chunk out"
-        )
+    for wanted, able, option in (
+        (chunked, "chunks", "chunk"),
+        (timed, "one_time", "time"),
+        (colored, "meshes", "height_colors"),
+    ):
+        if wanted and not getattr(ending, able):
+            valid = ", ".join(suffix for suffix, each in ENDINGS.items() if getattr(each, able))
+            raise ExportError(f"{option} is only for {valid}, not for {path.name}; leave it out")
     try:
         final = final_path(path)
         # the writer, and `made_here`, go by the ending
@@ -232,4 +260,12 @@ def check_written(
         raise ExportError(
             f"tessellation must be one of {', '.join(map(repr, TESSELLATIONS))}, got "
             f"{shown(tessellation)}"
+        )
+
+
+def check_mesh_format(mesh_format: str) -> None:
+    """Check the format of the files in a folder of meshes; raise `ExportError`."""
+    if mesh_format not in MESH_FORMATS:
+        raise ExportError(
+            f"mesh_format must be {' or '.join(map(repr, MESH_FORMATS))}, got {shown(mesh_format)}"
         )

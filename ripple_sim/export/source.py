@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import mujoco
 
@@ -58,6 +58,10 @@ class Source:
         Whether a table is of their samples.
     replay : bool
         Whether a page plays recorded heights rather than solve the waves itself.
+    mesh_format : str
+        "ply" or "glb", of the files in a folder of meshes.
+    height_colors : float or "auto", optional
+        Height at which the colours of meshes end [m]; "auto" is the greatest in each file.
     """
 
     model: mujoco.MjModel
@@ -78,6 +82,8 @@ class Source:
     sensors: Mapping[str, Sensor] = dataclasses.field(default_factory=dict)
     signals: bool = False
     replay: bool = False
+    mesh_format: str = "ply"
+    height_colors: float | Literal["auto"] | None = None
 
     def mesh(self, name: str) -> MovingMesh:
         """The surface of a target."""

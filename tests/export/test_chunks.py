@@ -118,8 +118,8 @@ def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("run.usdz", {}, r"chunks of \.usdc and \.usda files alone"),
-        ("run.html", {}, r"chunks of \.usdc and \.usda files alone"),
+        ("run.usdz", {}, r"chunk is only for \.usdc, \.usda, not"),
+        ("run.html", {}, r"chunk is only for \.usdc, \.usda, not"),
         ("run.usdc", {"chunk": 0}, "chunk must be a whole number, 1 or greater, got 0"),
         ("run.usdc", {"chunk": None, "resume": True}, "add --chunk"),
     ],
