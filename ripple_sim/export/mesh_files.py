@@ -19,7 +19,7 @@ from trimesh.exchange.ply import export_ply
 from trimesh.visual.material import PBRMaterial
 
 from ripple_sim.coupling.ripples import Impulse
-from ripple_sim.coupling.soft import is_soft, target_pose
+from ripple_sim.coupling.soft import target_pose
 from ripple_sim.encode.replace import MARK, made_here as file_made_here
 from ripple_sim.overlay.color_map import colors
 from ripple_sim.render.tone_mapping import srgb_to_linear
@@ -163,8 +163,7 @@ class _FrameFiles:
                 linear_colors[name] = [1.0, 1.0, 1.0, 1.0]
                 mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=_linear(heat))
             pose = np.eye(4)
-            if not is_soft(self._source.model, geom):
-                pose[:3, 3], pose[:3, :3] = target_pose(data, geom)
+            pose[:3, 3], pose[:3, :3] = target_pose(data, geom)
             scene.add_geometry(mesh, node_name=name, geom_name=name, transform=pose)
         for solid in self._solids:
             name = _untaken(solid.name, linear_colors)
@@ -216,7 +215,7 @@ def _paint(
     linear_colors: dict[str, list[float]],
     double_sided: bool = False,
 ) -> None:
-    """Give a mesh the material of a finish; note its colour, linear RGBA, by the material's name."""
+    """Give a mesh the material of a finish; note its colour, linear RGBA, by its name."""
     look = finish.look
     opacity = finish.opacity * (1 - look.transparency)
     linear_colors[name] = [*map(float, finish.color), opacity]

@@ -43,8 +43,8 @@ class ExportOptions(SceneOptions):
     mesh_format: Literal["ply", "glb"] = "ply"
     """Format of the files in a folder NAME.meshes."""
     height_colors: float | Literal["auto"] | None = None
-    """Colour rippling surfaces by height in meshes, from blue to red: metres at which the colours end, or
-    auto, the greatest height in each file."""
+    """Colour rippling surfaces by height in meshes, from blue to red: metres at which the colours
+    end, or auto, the greatest height in each file."""
     signals: bool = False
     """Write the samples of the scene's sensors, in place of impulses (.csv, .parquet)."""
     sound: bool = False

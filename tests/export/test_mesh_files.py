@@ -132,9 +132,9 @@ def test_options_of_meshes_are_refused_elsewhere(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"time": -1.0}, "time is -1.0; valid is 0 s or more"),
-        ({"height_colors": 0.0}, "height colors is 0.0; valid is 'auto', or a number of metres"),
-        ({"mesh_format": "obj"}, "mesh format is 'obj'; valid is 'ply' or 'glb'"),
+        ({"time": -1.0}, "time must be 0 s or more, got -1.0"),
+        ({"height_colors": 0.0}, "height colors must be 'auto', or a number of metres greater"),
+        ({"mesh_format": "obj"}, "mesh format must be 'ply' or 'glb', got 'obj'"),
     ],
 )
 def test_invalid_options_of_meshes_are_refused(options: dict, message: str) -> None:
