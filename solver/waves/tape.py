@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..backends.backend import Backend, TexelLoad
-from ..backends.kernels import Amplitude
+from ..backends.step_kernels import Amplitude
 from ..operator.wave_operator import WaveOperator
 
 # What a tape holds, in order:
