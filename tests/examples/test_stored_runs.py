@@ -20,7 +20,7 @@ PAGES = {
     "plates": "validation.md",
     "waveforms": "validation.md",
     "sphere_on_film": "validation.md",
-    "pulsating_sphere": "signals.md",
+    "pulsating_sphere": "validation.md",
 }
 
 
