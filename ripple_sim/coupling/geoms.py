@@ -38,18 +38,18 @@ ByGeom = Mapping[str, Value] | Mapping[int, Value] | Mapping[GeomKey, Value]
 def geom_name(model: mujoco.MjModel, geom: GeomId) -> str:
     """Name of a geom.
 
-    A geom without a name is called "body/index", by its index among the geoms of its body; or
-    "geom <id>", if the body has no name or another geom is called so.
+    A geom without a name is called "body/index", by its index among the geoms of its body; a body
+    without a name counts as "body <id>". If another geom is called so, it is "geom <id>".
     """
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
     if name:
         return str(name)
     body = int(model.geom_bodyid[geom])
     body_name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body)
-    place = f"{body_name}/{geom - int(model.body_geomadr[body])}"
+    place = f"{body_name or f'body {body}'}/{geom - int(model.body_geomadr[body])}"
     # another geom may be called so
     taken = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, place) >= 0
-    return place if body_name and not taken else f"geom {geom}"
+    return f"geom {geom}" if taken else place
 
 
 def find_geom(model: mujoco.MjModel, key: GeomKey) -> GeomId:
@@ -68,8 +68,10 @@ def find_geom(model: mujoco.MjModel, key: GeomKey) -> GeomId:
         if body >= 0 and index.isdecimal() and int(index) < model.body_geomnum[body]:
             return geom_id(int(model.body_geomadr[body]) + int(index))
     names = [geom_name(model, geom_id(i)) for i in range(model.ngeom)]
-    if isinstance(key, str) and key in names:
-        return geom_id(names.index(key))
+    numbers = [f"geom {i}" for i in range(model.ngeom)]
+    for called in (names, numbers):
+        if isinstance(key, str) and key in called:
+            return geom_id(called.index(key))
     listed = ", ".join(map(repr, names[:_MAX_LISTED])) or "none"
     if model.ngeom > _MAX_LISTED:
         listed += f" and {model.ngeom - _MAX_LISTED} more"

@@ -26,6 +26,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.geoms import geom_name
 from ripple_sim.coupling.hooks import adopt_warnings
 from ripple_sim.errors import ExportError, VideoError
 from ripple_sim.export.exporter import Exporter, ExportSummary, scene_source
@@ -173,6 +174,8 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
 
     They are the light and background at the first frame, and the camera's shutter and size.
     """
+    from pxr import Tf
+
     model = source.model
     pose = source.pose(data)
     if not pose.has_square_pixels(source.size[0] / source.size[1]):
@@ -183,6 +186,7 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     lighting = lighting_of(model, data, pose, source.lighting)
     studio = lighting.studio
     floor = find_floor(model, source.ripples.geom_ids.values())
+    floor_name = None if floor is None else Tf.MakeValidIdentifier(geom_name(model, floor))
     albedo = None
     if floor is not None:
         visual = geom_visual(model, floor)
@@ -197,7 +201,7 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
         "horizon": horizon.tolist(),
         "zenith": zenith.tolist(),
         "sky": sky.tolist(),
-        "floor": None if floor is None else model.geom(floor).name or f"geom_{floor}",
+        "floor": floor_name,  # of its prim in the USD file
         "fade": list(STUDIO_FADE if studio else FADE),
         "boxes_reflected": strength,
         "boxes_diffuse": _DIFFUSE_SHARE * strength if studio else 0.0,

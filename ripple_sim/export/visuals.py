@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.ids import TargetId
+from ripple_sim.coupling.geoms import geom_name
+from ripple_sim.coupling.ids import TargetId, geom_id
 from ripple_sim.render.contract import MappingKind
 from ripple_sim.render.surfaces.surface import painted
 from ripple_sim.render.tone_mapping import srgb_to_linear
@@ -143,10 +144,10 @@ def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:
         # a mesh asset counts v as MuJoCo does, from the upper edge
         own = mesh.uv if mapping.own and mesh.uv is not None else mapping.at(points)
         uv = texture_places(mapping, own)[mesh.faces]
-    kind, own = (
-        ("site", model.site(visual.index)) if visual.site else ("geom", model.geom(visual.index))
-    )
-    name = own.name or f"{kind}_{visual.index}"
+    own = model.site(visual.index) if visual.site else model.geom(visual.index)
+    name = own.name or f"site {visual.index}"
+    if not visual.site:
+        name = geom_name(model, geom_id(visual.index))
     position = np.array(own.pos)
     quaternion = np.array(own.quat)
     normals = normalized(mesh.normals)

@@ -17,11 +17,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
-from ripple_sim.solver.operator.presets import PRESETS
-
-# Constructors of `Material`. The presets of a scene file are these constructors, and the real
-# materials of `PRESETS`.
-LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water", "suited")
+from ripple_sim.solver.operator.presets import LAWS, PRESETS
 
 # Advice in messages.
 _LAYER = (
@@ -110,15 +106,14 @@ def preset_material(name: str, given: dict[str, Any]) -> Material:
                 f"the preset {name!r} has no parameter {key!r}; its parameters are "
                 f"{', '.join(parameters)}"
             )
-    if name in PRESETS:
-        return Material.preset(name, **given)
     for key, parameter in parameters.items():
-        if parameter.default is inspect.Parameter.empty and key not in given:
+        is_needed = name not in PRESETS and parameter.default is inspect.Parameter.empty
+        if is_needed and key not in given:
             raise SceneError(
                 f"the preset {name!r} needs {key}: write {name},{key}=..., or in a scene file "
                 f"preset = {{name = {name!r}, {key} = ...}}"
             )
-    return getattr(Material, name)(**given)
+    return Material.preset(name, **given)
 
 
 class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):

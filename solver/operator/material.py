@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import POSITIVE, SolverError, is_finite, shown, warn_caller
 from ..texels.atlas import Atlas
 from .coefficients import LIMITS, check_mask, check_numbers, check_wavelengths, require_positive
-from .presets import PRESETS
+from .presets import LAWS, PRESETS
 from .suited_law import suited_coefficients
 
 # A layer has omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2. This is the even fit, for 1.3 <= q d
@@ -438,18 +438,28 @@ class Material:
         return cls.layer(modulus, viscosity, density, thickness)
 
     @classmethod
-    def preset(cls, name: str, **parameters: float) -> Self:
-        """Real material by its name in `PRESETS`, with some parameters of its constructor changed.
+    def preset(cls, name: str, **parameters: Any) -> Self:
+        """Material by name, as `preset` of a scene file has it.
+
+        Parameters
+        ----------
+        name : str
+            Name of a real material in `PRESETS`, such as "gelatine-3", or of a constructor, such as
+            "jelly" or "water".
+        parameters
+            Parameters of the constructor that are to be others, in its units.
 
         Raises
         ------
         SolverError
-            For an unknown name or parameter.
+            For an unknown name or parameter, or a missing one.
         """
-        if not isinstance(name, str) or name not in PRESETS:
-            raise SolverError(f"preset must be one of {', '.join(PRESETS)}, got {shown(name)}")
-        chosen = PRESETS[name]
-        law = getattr(cls, chosen.law)
+        names = (*LAWS, *PRESETS)
+        if not isinstance(name, str) or name not in names:
+            raise SolverError(f"preset must be one of {', '.join(names)}, got {shown(name)}")
+        real = PRESETS.get(name)
+        law = getattr(cls, name if real is None else real.law)
+        usual = {} if real is None else real.parameters
         valid = inspect.signature(law).parameters
         unknown = [key for key in parameters if key not in valid]
         if unknown:
@@ -457,7 +467,13 @@ class Material:
                 f"the preset {name!r} has no parameter {unknown[0]!r}; its parameters are "
                 f"{', '.join(valid)}"
             )
-        return law(**{**chosen.parameters, **parameters})
+        chosen = {**usual, **parameters}
+        for key, parameter in valid.items():
+            if parameter.default is inspect.Parameter.empty and key not in chosen:
+                raise SolverError(
+                    f"the preset {name!r} needs {key}: write Material.preset({name!r}, {key}=...)"
+                )
+        return law(**chosen)
 
 
 def _thickness(value: Any) -> float | NDArray[np.float64]:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 
+# Constructors of `Material` that are presets by their own names.
+LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water", "suited")
+
 # Source of the gelatines.
 _GELATINE = (
     "Nguyen et al. 2014, Ultrasound in Medicine and Biology 40, 168 (shear wave elastography, "

@@ -22,8 +22,9 @@ def test_every_geom_has_a_name_of_its_own_by_which_it_is_found() -> None:
     model = model_of(NAMELESS)
     names = [geom_name(model, geom) for geom in range(model.ngeom)]
     # the fourth geom of the torso would be "torso/3", but another one is called so
-    assert names == ["world/0", "chest", "torso/1", "torso/3", "geom 4", "geom 5"]
+    assert names == ["world/0", "chest", "torso/1", "torso/3", "geom 4", "body 2/0"]
     assert [find_geom(model, name) for name in names] == list(range(6))
+    assert find_geom(model, "geom 5") == 5
     assert find_geom(model, "torso/0") == find_geom(model, np.int64(1)) == 1
     # names with a slash, as dm_control gives them
     model = model_of(

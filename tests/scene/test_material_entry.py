@@ -33,6 +33,7 @@ def material_of(table: dict) -> Material:
         ({"speed": 2, "density": 5.0}, Material(speed=2.0, density=5.0)),
         ({"tightening": 1.0}, Material(tightening=1.0)),
         ({"preset": "jelly"}, Material.jelly()),
+        ({"preset": "jelly"}, Material.preset("jelly")),
         (
             {"preset": {"name": "suited", "size": 2.0, "hit": [0.5, 4.0]}},
             Material.suited(2.0, (0.5, 4.0)),
@@ -51,7 +52,10 @@ def material_of(table: dict) -> Material:
             {"preset": {"name": "membrane", "tension": 8.0, "density": 2.0}},
             Material.membrane(8.0, 2.0),
         ),
-        ({"preset": {"name": "dent", "yield_height": 0.01}}, Material.dent(0.01)),
+        (
+            {"preset": {"name": "dent", "yield_height": 0.01}},
+            Material.preset("dent", yield_height=0.01),
+        ),
         # beside the preset stand the wave equation's own coefficients, in their own units
         (
             {"preset": {"name": "jelly", "density": 900.0}, "density": 40.0, "damping": 0.0},

@@ -39,7 +39,11 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "preset of a list": (
         lambda: Material.preset([]),
-        r"preset must be one of gelatine-3, .*, got \[\]",
+        r"preset must be one of membrane, .*, gelatine-3, .*, got \[\]",
+    ),
+    "preset without what it needs": (
+        lambda: Material.preset("dent"),
+        r"the preset 'dent' needs yield_height: write Material.preset\('dent', yield_height=",
     ),
     "nothing inside": (
         lambda: thickness_map(ATLAS, None),
