@@ -1,4 +1,4 @@
-"""What a user compares machines with: `ripple-sim bench`.
+"""Benchmarks for comparing machines: `ripple-sim bench`.
 
 The speed of the wave step beside the bound of memory, what the coupling costs beside MuJoCo's own
 step, and the error of the waves where theory is exact. `examples/benchmarks` compares with other

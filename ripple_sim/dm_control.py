@@ -47,7 +47,7 @@ def couple(
     looks : mapping, optional
         Geom to its look, as for `RippleRenderer`.
     lighting : str
-        What lights the frames, likewise: "model", "studio" or "auto".
+        Lights of the frames: "model", "studio" or "auto".
     **options
         Keyword arguments of `Ripples`.
 

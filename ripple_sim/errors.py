@@ -17,7 +17,7 @@ __all__ = [
 
 
 class BatchError(RippleError):
-    """A batch cannot go on in its folder: the plan has changed, or the disk is full."""
+    """A batch cannot continue in its folder: the plan has changed, or the disk is full."""
 
 
 class VideoError(RippleError):
@@ -25,7 +25,7 @@ class VideoError(RippleError):
 
 
 class ExportError(RippleError):
-    """The ending or the place of an export is invalid, or it needs what is not installed."""
+    """The ending or the place of an export is invalid, or a package for it is missing."""
 
 
 class EncodingError(RippleError):

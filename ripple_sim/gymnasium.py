@@ -90,7 +90,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
 
     With the modes "rgb_array", "depth_array" and "rgbd_tuple", `render` returns what Gymnasium's
     own would, with the ripples: the environment's own `render` runs, with its camera and its
-    markers, and ripple-sim draws in place of Gymnasium's `MujocoRenderer` or `mujoco.Renderer`.
+    markers; ripple-sim draws instead of Gymnasium's `MujocoRenderer` or `mujoco.Renderer`.
     Where it uses neither, the model is drawn with MuJoCo's free camera, and a warning says so.
     Other modes draw without ripples. Observation, reward and their spaces are those of the
     environment. A pickled or copied environment begins anew, as Gymnasium's own ones do.

@@ -294,7 +294,7 @@ class Ear:
         return Placement(probes, every * delays)
 
     def _faded(self, times: NDArray) -> NDArray:
-        """Share of the last placement in what is heard at given times [s], [k].
+        """Share of the last placement in the sound at given times [s], [k].
 
         It rises from 0 to 1 over the time that the placement before lasted.
         """

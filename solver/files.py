@@ -29,7 +29,7 @@ _LONGEST_SUFFIX = ".0123456789.part"
 
 
 def final_path(path: Path) -> Path:
-    """The path to which a path to be written leads, after its symbolic links.
+    """The path that will be written, after its symbolic links.
 
     Raises `OSError` if links lead in a circle, or if the name is too long for the system, also with
     the suffix of an unfinished file.

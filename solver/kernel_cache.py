@@ -86,7 +86,7 @@ def compile_for_plain_types(compiled: Any) -> None:
 
 
 def _plain(kind: Any) -> Any:
-    """The type of numba's with which a kernel is called in place of `kind`.
+    """The numba type that a kernel is called with instead of `kind`.
 
     There is then no version of a kernel for each literal number, or for small integers.
     """
@@ -95,7 +95,7 @@ def _plain(kind: Any) -> Any:
 
 
 class _KernelCache(FunctionCache):
-    """Compiled versions of one kernel on disk, in place of numba's own cache."""
+    """Compiled versions of one kernel on disk, instead of numba's own cache."""
 
     def __init__(self, function: Callable) -> None:
         self._name = repr(function)
@@ -118,7 +118,7 @@ class _KernelCache(FunctionCache):
     def load(self, key: Any) -> Any:
         """The compiled code of a key of numba's, or None."""
         path = self._path(key)
-        with contextlib.suppress(Exception):  # whatever a file holds, a kernel can be compiled
+        with contextlib.suppress(Exception):  # of any kind: the kernel is then compiled
             content = path.read_bytes()
             pickled = content[_CHECKSUM_BYTES:]
             if content[:_CHECKSUM_BYTES] == _checksum(path, pickled):

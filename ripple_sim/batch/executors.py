@@ -87,7 +87,7 @@ class DaskExecutor(Executor):
         return self._executor.submit(function, *arguments, **named)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Leave the cluster; without `wait` what is not yet done is given up."""
+        """Leave the cluster; without `wait`, unfinished work is dropped."""
         self._log.removeFilter(self._silence)
         self._executor.shutdown(wait=wait)
         self._client.close()
@@ -148,7 +148,7 @@ class LocalExecutor(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes; without `wait` at once, whatever they are at."""
+        """End the processes; without `wait`, end them at once and drop unfinished work."""
         for pool, process in list(self._pools.values()):
             if not wait and process.done() and not process.exception():
                 with contextlib.suppress(ProcessLookupError):

@@ -38,7 +38,7 @@ TIMES = "times.json"
 
 
 def facts_hash(facts: dict[str, Any]) -> str:
-    """Hash of what is known of a scene, which its files' hashes are part of."""
+    """Hash of the record of a scene, which contains the hashes of its files."""
     return hashlib.blake2b(msgspec.json.encode(facts), digest_size=16).hexdigest()
 
 
@@ -59,7 +59,7 @@ class FinishedScene:
         return f"FinishedScene({self.number})"
 
     def names(self) -> list[str]:
-        """Names of its files; in a tar file with dots in place of slashes."""
+        """Names of the scene's files; in a tar file with dots instead of slashes."""
         if self._members is not None:
             return sorted(self._members)
         found = sorted(
@@ -204,7 +204,7 @@ def scenes_in_tar(tar: Path) -> Iterator[FinishedScene]:
 
 
 def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[FinishedScene]:
-    """The scenes that are there, each once, but for those that are known."""
+    """The finished scenes, each once, without the scenes that are known already."""
     loose = sorted(batch.loose())
     packed: set[int] = set()
     # looked at later than the folders, so that no scene is missed on its way into one
@@ -245,7 +245,7 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
         ):
             for number, scene in scenes.items():
                 for name in scene.names():
-                    # WebDataset takes what is before the first dot for the scene
+                    # WebDataset takes the part before the first dot as the scene
                     member = tarfile.TarInfo(f"{number:06d}.{name.replace('/', '.')}")
                     content = scene.read(name)
                     member.size = len(content)

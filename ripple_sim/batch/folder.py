@@ -1,4 +1,4 @@
-"""The folder of a batch: where things stand in it, what is finished, and who works on what.
+"""The folder of a batch: its files, the finished scenes, and the scenes being made.
 
 `plan.json` is what the scenes are made by; `scenes/000012` is a finished scene, or a member of
 `tars/000000.tar`; `work/000012` is one that is being made, locked by whoever makes it;
@@ -80,7 +80,7 @@ class Failure(msgspec.Struct):
 
     @property
     def aside(self) -> bool:
-        """Whether it is not tried again by itself."""
+        """Whether the scene is not tried again unless the user asks."""
         return self.errors >= ERRORS or self.deaths >= DEATHS
 
 

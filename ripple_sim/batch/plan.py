@@ -1,4 +1,4 @@
-"""The TOML file of a batch: what varies, from which distributions, and what is stored.
+"""The TOML file of a batch: varied values, their distributions, and the stored outputs.
 
 Keys of a plan are such as `camera.azimuth`, `ripple[duck].material.speed`, `geom[ball*].size[0]`.
 """
@@ -71,7 +71,7 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
     length: int | None = None
     """How many numbers are drawn, independently, for a vector."""
     apply: Literal["set", "add", "multiply"] = "set"
-    """What is done with the value that is there: it is replaced, added to, or multiplied."""
+    """How the drawn value changes the value in the scene: replace it, add to it, or multiply it."""
     together: bool = False
     """Whether a key that fits several places gives them all the same value."""
 
@@ -142,7 +142,7 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
             )
 
     def _problem(self) -> str | None:
-        """What is wrong with the numbers, as what is valid."""
+        """The rule that the numbers break, in words; None if they break none."""
         pair = self.uniform or self.log_uniform or self.integers or self.limits
         if pair is not None:
             low = np.array(pair[0], float)
@@ -214,7 +214,7 @@ def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
 
 
 class StoreEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[store]`: what is kept of each scene."""
+    """`[store]`: the outputs of each scene."""
 
     video: Literal["mp4", "webm", "gif", "webp", "png", "exr", "none"] = "mp4"
     """`mp4`, `webm`, `gif`, `webp`; `png` or `exr`: a folder of frames; `none`: nothing is
@@ -299,7 +299,7 @@ class PlanFile(msgspec.Struct, forbid_unknown_fields=True):
     model: dict[str, Any] = {}
     """Values for attributes of the MJCF's elements, see below."""
     store: StoreEntry = msgspec.field(default_factory=StoreEntry)
-    """What is kept, see below."""
+    """The outputs of each scene, see below."""
 
 
 class Plan(msgspec.Struct, frozen=True):
@@ -330,7 +330,7 @@ def read_plan(path: str | Path) -> Plan:
     Raises
     ------
     SceneError
-        Naming the key, its value and what is valid.
+        With the key, its value and the expected values.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
@@ -355,7 +355,7 @@ def read_plan(path: str | Path) -> Plan:
 def check_plan(plan: Plan) -> None:
     """Make sure that scenes can be made and kept by a plan, before one is made.
 
-    Raises `RippleError` with the key, its value and what is valid, or the package that is missing.
+    Raises `RippleError` with the key, its value and the expected values, or a missing package.
     """
     store = plan.store
     for name, value, least, most in (

@@ -98,7 +98,7 @@ def parquet() -> Any:
 def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
     """Write the table and the page of all scenes that are finished or put aside.
 
-    `rows` has what is known by number, see `row`; finished scenes that it lacks are added to it.
+    `rows` has records by scene number, see `row`; finished scenes that it lacks are added.
     """
     import pyarrow
 
@@ -134,7 +134,7 @@ def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
 
 
 def row(facts: dict[str, Any], times: dict[str, Any]) -> dict[str, Any]:
-    """What the index says of a finished scene: one value a column."""
+    """The row of a finished scene in the index: one value a column."""
     targets = facts["targets"].values()
     return {
         "status": "finished",
@@ -199,7 +199,7 @@ def load_batch(path: str | Path) -> Batch:
 
 
 def status_text(path: Path) -> str:
-    """What is finished, what failed and why, and what is still to be made.
+    """Status of a batch: finished scenes, failed scenes with reasons, and scenes to make.
 
     Raises `BatchError` if there is no batch in the folder.
     """

@@ -57,7 +57,7 @@ class RunOptions:
     shard: tuple[int, int] = (1, 1)
     """Which part of the scenes to make, of how many."""
     limit: int | None = None
-    """At most so many scenes in this run."""
+    """Greatest number of scenes in this run."""
     dask: str | None = None
     """Address of a Dask scheduler whose workers make the scenes."""
     retry_failed: bool = False
@@ -212,7 +212,7 @@ class BatchRun:
 
 
 def work(folder: str, number: int) -> Outcome:
-    """What a worker does: make a scene.
+    """Make one scene, in a worker.
 
     The first on each machine is made alone, for it compiles the kernels for all others; so is the
     first of each source, which makes the atlases.
@@ -246,7 +246,7 @@ def run_batch(
     Parameters
     ----------
     plan : Plan or None
-        From `read_plan`; None goes on with the plan in the folder.
+        From `read_plan`; None continues with the plan in the folder.
     output : path
         Folder of the batch.
     options : RunOptions
@@ -281,7 +281,7 @@ def run_batch(
             )
         try:
             run.work(executor, progress)
-        except BaseException as error:  # such as Ctrl-C: what is unfinished goes on next time
+        except BaseException as error:  # such as Ctrl-C: unfinished scenes are made next time
             gone = (
                 executor.refusal()
                 if isinstance(executor, DaskExecutor) and isinstance(error, Exception)

@@ -221,7 +221,7 @@ def _assign(element: Any, attribute: str, index: int | None, value: Any, apply: 
 
 
 class Variation:
-    """The scene of a number, which is the same whoever makes it, and in whatever order.
+    """The scene of a number; it does not depend on the worker or on the order.
 
     Each key has a stream of random numbers of its own, so a key more in the plan leaves the values
     of the others.
@@ -283,7 +283,7 @@ class Variation:
                 repair=meshes.repair,
                 wrap=meshes.wrap,
             )
-            # what a scene file would say of it: what is not as by default, as plain values
+            # as in a scene file: values that differ from the defaults, as plain values
             parts = {"ripple": list(scene.targets), "camera": scene.camera}
             parts |= {name: list(events) for name, events in vars(scene.events).items()}
             table = {"model": scene.name, "duration": scene.duration, "two_way": scene.two_way}

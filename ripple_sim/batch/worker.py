@@ -1,4 +1,4 @@
-"""`make_scene`: one scene of a batch, made in a folder of its own by whatever process is told to.
+"""`make_scene`: make one scene of a batch, in a folder of its own, in any process.
 
 Beside its frames a running scene leaves a `FrameRecord`: impulses, heights, positions, energies.
 """
@@ -170,7 +170,7 @@ class FrameRecord:
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """What became of a scene that a worker was told to make.
+    """The outcome of a worker's scene.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ class Outcome(msgspec.Struct, frozen=True):
 def make_scene(folder: str, number: int) -> Outcome:
     """Make a scene of the batch in a folder, unless it is there or another process makes it.
 
-    Its files are the same, byte for byte, whoever makes it and when, but for `times.json`, which
+    Its files do not depend on the worker or the time, byte for byte, except `times.json`, which
     tells these.
     """
     batch = BatchFolder(Path(folder))
@@ -214,7 +214,7 @@ def make_scene(folder: str, number: int) -> Outcome:
             _write_json(
                 place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()}
             )
-        except Exception as error:  # of any kind: the batch goes on without this scene
+        except Exception as error:  # of any kind: the batch continues without this scene
             clear(place)
             reason: BaseException | None = error
             while isinstance(reason, EncodingError):  # which names the file

@@ -132,7 +132,7 @@ class FrameSource:
         return self._exposure.expose(self.renderer.fetch())
 
     def sighting(self, snapshot: Snapshot) -> Sighting:
-        """What the camera sees at a snapshot, through the middle of its lens."""
+        """The sighting of a snapshot, through the middle of the camera's lens."""
         data = snapshot.data
         height_maps = self._height_maps_by_geom(snapshot)
         camera = self.camera(snapshot)

@@ -22,7 +22,7 @@ from ripple_sim.solver.texels.chart_page import ChartPage
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sighting:
-    """What the camera sees at a time.
+    """The scene from the camera at one time.
 
     Attributes
     ----------

@@ -122,7 +122,7 @@ class ExportCommand(_SceneCommand, ExportOptions):
 
 
 class _Rate(ProgressColumn):
-    """The rate, or what is being compiled and for how many seconds so far."""
+    """The rate, or the kernels being compiled and the seconds so far."""
 
     def render(self, task: Task) -> Text:
         from ripple_sim.solver.compile_clock import compile_times, compiling
@@ -138,7 +138,7 @@ class _Rate(ProgressColumn):
 
 
 def _stage(module: str) -> str:
-    """What the kernels of a module compute, in a user's words."""
+    """A phrase for users: what the kernels of a module compute."""
     fitting = [package for package in _STAGES if f"{module}.".startswith(f"{package}.")]
     return _STAGES[max(fitting, key=len)] if fitting else module
 

@@ -57,7 +57,7 @@ _PRINTED_FIELDS = tuple(
 
 
 def scales_of(atlas: Atlas) -> tuple[Floats32, float, float]:
-    """What the heights on an atlas are compared with.
+    """The lengths on an atlas that heights are compared with.
 
     Returns
     -------
@@ -177,7 +177,7 @@ class _WatchedTarget:
     ----------
     waves : WaveSolver
     excess : float
-        The most, over what is allowed, of heights and slopes.
+        Greatest height and slope over the allowed ones.
     needed : float
         By how much waves would have to be lower.
     what : str

@@ -1,4 +1,4 @@
-"""Geoms that collide in place of a target, as models of robots have them."""
+"""Geoms that collide instead of a target, as in models of robots."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ def turn(state: ContactState, side: float) -> None:
 def touch(
     state: ContactState, force: float, point: Floats, place_radius: float, dt: float
 ) -> float:
-    """Advance a contact by a step in which it touches; return the force on the surface [N].
+    """Advance a touching contact by a step; return the force on the surface [N].
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ class Easing:
 
     @functools.cached_property
     def _thinness(self) -> Floats:
-        """Thickness of the target at each texel over that of the law, at most 1."""
+        """Thickness of the target at each texel over the thickness of the law, at most 1."""
         return np.minimum(half_thickness(self._atlas).reshape(-1) / self._law.thickness, 1.0)
 
     def shares(self, colliders: Ints, texels: Ints, forces: Floats, elapsed: float) -> Floats:
@@ -125,7 +125,7 @@ class Easing:
         return share[bodies]
 
     def pause(self, elapsed: float) -> None:
-        """Go on by a time [s] in which nothing touches."""
+        """Advance by a time [s] without contact."""
         self._smoothed *= math.exp(-self._law.rate * elapsed)
 
     def clear(self) -> None:
@@ -143,7 +143,7 @@ def bodies_of(coupled: CoupledModel) -> NDArray[np.int64]:
 
 
 def easing_warning(name: str, easing: Easing) -> str | None:
-    """What to warn of where forces are eased, else None."""
+    """The warning about targets whose forces are eased, or None."""
     if easing.least_share >= _WARNED_SHARE:
         return None
     return (

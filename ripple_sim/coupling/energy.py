@@ -210,12 +210,12 @@ class Pair(NamedTuple):
 
     @property
     def purse(self) -> Purse:
-        """The pair's account; two targets that touch each other, which are two pairs, share one."""
+        """The pair's account; the two pairs of two targets that touch each other share one."""
         return min(self.key), max(self.key)
 
 
 class Work(NamedTuple):
-    """What the force of a pair does in a step.
+    """The work of a pair's force in a step.
 
     Attributes
     ----------
@@ -357,7 +357,7 @@ class ContactProblem:
             Energy that pairs have paid in [J], by `Pair.purse`.
         """
         data = self._data
-        # what is added to R so that rows bear less [1/kg]
+        # added to R so that rows carry less force [1/kg]
         softness = np.zeros(data.nefc)
         force = np.zeros(data.nefc)
         for attempt in range(_AFFORDING_ATTEMPTS):
@@ -386,7 +386,7 @@ class ContactProblem:
         return self._total(force)
 
     def works(self) -> list[Work]:
-        """What the force of each pair does, with the forces that were found."""
+        """The work of each pair, with the forces that were found."""
         force = self._data.efc_force
         work = defaultdict[Key, float](float)
         mean_velocity = self._data.efc_vel + self._dt / 2 * self._along(self._data.qacc)

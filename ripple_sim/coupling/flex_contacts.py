@@ -149,7 +149,7 @@ class FlexContacts:
         return kept, (met + outside[:, None] * normals)[kept], forces[kept], normals[kept]
 
     def _judge(self, targets: Ints, force: Floats, amount: Floats, friction: Floats) -> None:
-        """Warn, once for each, of targets whose forces are not those of a contact.
+        """Warn once for each target whose forces do not come from a contact.
 
         Parameters
         ----------

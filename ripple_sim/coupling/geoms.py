@@ -122,7 +122,7 @@ def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str
 
 
 def find_any(model: mujoco.MjModel, key: GeomKey) -> TargetId:
-    """Id of a geom, whatever its type, or else of the flex or skin of a name.
+    """Id of a geom of any type, or of the flex or skin of a name.
 
     Raises `SceneError` if there is nothing of that name.
     """

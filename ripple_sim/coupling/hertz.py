@@ -1,4 +1,4 @@
-"""The pulse of a hit by Hertz's law, in place of MuJoCo's soft contact.
+"""The pulse of a hit by Hertz's law instead of MuJoCo's soft contact.
 
 Two elastic bodies press each other with a force that grows as the power 3/2 of their approach
 (Hertz 1882; Johnson, Contact Mechanics, 1985, sections 4.2 and 11.4). A ball that hits leaves after

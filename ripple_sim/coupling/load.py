@@ -154,7 +154,7 @@ class _Touches(NamedTuple):
 
 
 class StepContacts(NamedTuple):
-    """What touched a target in a step, and what its surface got, before the rest filter.
+    """The contacts of a target in a step and the impulses of its surface, before the rest filter.
 
     Attributes
     ----------
@@ -359,7 +359,7 @@ class TargetLoad:
         return self.given(elapsed, on_texels), touches
 
     def given(self, elapsed: float, present: TexelForces = NO_FORCES) -> StepLoad:
-        """Load over a time [s] in which these forces act, with the pulses of hits."""
+        """Load of these forces over a time [s], with the pulses of hits."""
         if self._easing is not None and present is NO_FORCES:
             self._easing.pause(elapsed)
         load = self._filter(present, elapsed)

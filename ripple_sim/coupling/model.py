@@ -62,7 +62,7 @@ def find_convex_colliders(model: mujoco.MjModel) -> dict[GeomId, list[GeomId]]:
 
 
 def _whole_geom(model: mujoco.MjModel, part: GeomId) -> GeomId | None:
-    """The geom of which another one is a convex part by its name and body, if there is one."""
+    """The geom that a convex part belongs to by its name and body, if there is one."""
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, part) or ""
     whole_name, mark, number = name.rpartition("#")
     if not mark or not number.isdecimal():
@@ -75,7 +75,7 @@ def _whole_geom(model: mujoco.MjModel, part: GeomId) -> GeomId | None:
 
 
 def find_flex_colliders(model: mujoco.MjModel) -> dict[GeomId, FlexId]:
-    """Flex that collides in place of a geom, by geom id.
+    """Flex that collides instead of a geom, by geom id.
 
     It is rigid, of triangles, and has the geom's name and body.
     """
@@ -296,6 +296,6 @@ class CoupledModel:
         return soft[meets.any(axis=1)]
 
     def _apart(self, geom: GeomId) -> NDArray[np.bool_]:
-        """Geoms, [ngeom], on bodies not welded to that of this one."""
+        """Geoms, [ngeom], on bodies that are not welded to the body of this geom."""
         weld = self.model.body_weldid[self.model.geom_bodyid]
         return np.asarray(weld != weld[geom])

@@ -126,7 +126,7 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
 def check_targets(
     model: mujoco.MjModel, other: mujoco.MjModel, targets: Mapping[str, TargetId]
 ) -> None:
-    """Make sure that the targets of another model are those of the model to be drawn.
+    """Make sure that another model has the same targets as the model to be drawn.
 
     `targets` are ids in the `other` model, by name. Raises `SceneError` if any geom has
     another shape or place, or a target another name.
@@ -160,7 +160,7 @@ def posed(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
 
 
 def _differing(model: mujoco.MjModel, other: mujoco.MjModel, kinds: tuple[str, ...]) -> str | None:
-    """Name of the first array in which two models differ, of those whose names begin so."""
+    """Name of the first array that differs between two models, among names that begin so."""
     for name in dir(model):
         if not name.startswith(kinds) or name.endswith(_LOOKS):
             continue

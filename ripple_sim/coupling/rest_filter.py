@@ -113,7 +113,7 @@ class RestFilter:
         return np.asarray(self._states["active"])
 
     def forget_places(self) -> None:
-        """Begin to average anew, as where other texels carry loads than before."""
+        """Restart the average, for instance because other texels carry loads than before."""
         self._states["memory"] = 0.0
 
     def set_timestep(self, timestep: float) -> None:
@@ -143,7 +143,7 @@ class RestFilter:
         state.prepaid += abs(impulse) / self._time_scale
 
     def __call__(self, present: TexelForces, dt: float) -> Load:
-        """Load over a time [s] in which these forces act."""
+        """Load of these forces over a time [s]."""
         if self._all_gone and not len(present.geoms):
             return Load.none()
         size = len(self._texels) + len(present.texels)

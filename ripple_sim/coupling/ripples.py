@@ -357,7 +357,7 @@ class Ripples:
     def step(self, data: mujoco.MjData) -> None:
         """Apply the contact forces of the latest physics step, and advance the waves.
 
-        The waves go on to `data.time`.
+        The waves advance to `data.time`.
 
         After `mj_step` the forces and poses in `data` are those at the beginning of the step.
         MuJoCo holds the forces over the step, so each contact gives normal force times time step.
@@ -391,7 +391,7 @@ class Ripples:
         SceneError
             If `data` belongs to another model.
         SimulationError
-            If MuJoCo cannot go on, as with too little memory for its contacts.
+            If MuJoCo cannot continue, for instance for lack of memory for contacts.
         """
         self._loads.skip()
         data = own_data(self.model, data)
@@ -474,7 +474,7 @@ class Ripples:
         return self._surface(name).waves.surface(state, self.vertices(name, state))
 
     def reset(self) -> None:
-        """Flatten all surfaces, and let time begin anew."""
+        """Flatten all surfaces, and restart time."""
         self._clock.restart()
         self._flatten()
 

@@ -1,4 +1,4 @@
-"""The surfaces of targets: how their waves are made, and made anew after a change."""
+"""The surfaces of targets: construction of their waves, and reconstruction after a change."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ class SoftSurface:
             self.geoms = [geom_id(geom) for geom in geoms.tolist()]
 
     def _flex_triangles(self, name: str) -> NDArray[np.int32]:
-        """Triangles of a flex, [m, 3]: its own, or those of the outside of its tetrahedra."""
+        """Triangles of a flex, [m, 3]: its own triangles, or the outside of its tetrahedra."""
         model = self._model
         flex = self.flex
         if model.flex_dim[flex] == 1:

@@ -44,12 +44,12 @@ IN_TURN_WARNING = (
 
 
 class Passed(NamedTuple):
-    """What happened since the last look.
+    """The events since the last look.
 
     Attributes
     ----------
     elapsed : float
-        Over how much time the waves go on [s]; 0 if there was no step.
+        Time by which the waves advance [s]; 0 if there was no step.
     missed : int
         Physics steps before the latest one, whose contact forces are gone.
     reset : bool
@@ -88,7 +88,7 @@ class StepClock:
         self.restart()
 
     def restart(self) -> None:
-        """Start anew, with whatever mark comes next."""
+        """Start anew with the next mark."""
         self._mark: float | None = None
         self._time: float | None = None
         self._timestep = 0.0
@@ -105,7 +105,7 @@ class StepClock:
         vars(self).update(state)
 
     def look(self, model: mujoco.MjModel, data: mujoco.MjData) -> Passed:
-        """What happened since the last look."""
+        """The events since the last look."""
         time = float(data.time)
         timestep = float(model.opt.timestep)
         before = self._time

@@ -1,4 +1,4 @@
-"""What suits a target where the user does not say: the material's coefficients, and the resolution.
+"""Default coefficients and default resolution of a target, from the model.
 
 Materials are chosen by the bodies that can touch the target, by how far they fall, and by the time
 step; resolutions are fine enough for what touches it and coarse enough for the time step.
@@ -300,7 +300,7 @@ def _density_under(
 
 
 class Hit(NamedTuple):
-    """What meets a target.
+    """The bodies that can hit a target.
 
     Attributes
     ----------

@@ -150,7 +150,7 @@ def target_mesh(model: mujoco.MjModel, geom: GeomId) -> Mesh:
 
 
 def _surface(model: mujoco.MjModel, geom: GeomId) -> tuple[NDArray, NDArray, NDArray | None, str]:
-    """What `Mesh.from_arrays` takes: vertices, triangles, texture coordinates, name."""
+    """The arguments of `Mesh.from_arrays`: vertices, triangles, texture coordinates, name."""
     kind = TARGET_TYPES[int(model.geom_type[geom])]
     asset = int(model.geom_dataid[geom])
     name = f"mesh of geom {geom_name(model, geom)!r}"

@@ -287,7 +287,7 @@ class _KnownMobilities(NamedTuple):
 
 
 def require_suited_options(model: mujoco.MjModel) -> None:
-    """Raise `SceneError` for options of a model with which contact forces cannot be found anew."""
+    """Raise `SceneError` for a model's options that two-way coupling does not support."""
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         raise SceneError(
             'two_way cannot work with the integrator "RK4", which takes four contact forces in '
@@ -348,7 +348,7 @@ class TwoWay:
     def solve(
         self, data: mujoco.MjData, solved: mujoco.MjData, elapsed: float, *, pending: bool
     ) -> dict[TargetId, Load]:
-        """Find the contact forces anew, correct the bodies' motion; return the targets' loads.
+        """Solve the contact problem again, correct the bodies' motion; return the targets' loads.
 
         Parameters
         ----------
@@ -512,7 +512,7 @@ class TwoWay:
         atlas = self._waves[target].atlas
         points = np.array([contact.point for contact in touching])
         if self._coupled.convex[other] and 1 < len(points) <= MAX_CORNERS:
-            # what is convex touches between two contacts, too
+            # a convex geom also touches between two contacts
             one, two = np.triu_indices(len(points), 1)
             points = np.concatenate([points, (points[one] + points[two]) / 2])
         if known is not None and known.serves(atlas, points):
@@ -558,7 +558,7 @@ class TwoWay:
     # How the surfaces move
 
     def _pairs(self, dt: float) -> dict[Key, Pair]:
-        """What the contact problem has to know of the surface under each place."""
+        """The motion of the surface under each place, for the contact problem."""
         pairs = {}
         for target in dict.fromkeys(target for target, _ in self._places):
             places = {key: place for key, place in self._places.items() if key[0] == target}

@@ -52,7 +52,7 @@ class WrapCheck:
                     break
 
     def _warn(self, target: TargetId, owner: int, ratio: float) -> None:
-        """Warn of a flex whose impulses are so many times the impulse of what it wraps round."""
+        """Warn of a flex whose impulses exceed the impulse of a wrapped body by a factor."""
         flex = self._names[self._owners[target]]
         other = self._names[owner]
         warn_caller(

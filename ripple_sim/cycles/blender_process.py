@@ -193,7 +193,7 @@ def set_input(tree, socket, value):
 
 
 def set_look(material, depth):
-    """What UsdPreviewSurface has no word for."""
+    """The properties of a look that UsdPreviewSurface lacks."""
     shader = next(
         (node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"), None
     )

@@ -197,7 +197,7 @@ def join_clips(
                 for packet in source.demux(video):
                     if packet.pts is None:  # end of stream
                         continue
-                    # exact frame numbers, whatever the container's time base
+                    # exact frame numbers in any time base of the container
                     tick = packet.time_base
                     decoded = packet.pts if packet.dts is None else packet.dts
                     packet.pts, packet.dts = (

@@ -68,7 +68,7 @@ def _images(clips: Sequence[tuple[Path, int]], fps: int) -> Iterator[av.VideoFra
 
 
 def _filtered(images: Iterable[av.VideoFrame], source: Any, sink: Any) -> Iterator[av.VideoFrame]:
-    """What comes out of a graph's sink, taken at once, while images go in at its source."""
+    """Images from a filter graph's sink, taken while images enter its source."""
     for image in itertools.chain(images, [None]):
         source.push(image)
         # until it wants the next image, or is done

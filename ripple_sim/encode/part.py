@@ -1,4 +1,4 @@
-"""The folder of an unfinished video: complete segments only, from which a killed render continues.
+"""The folder of an unfinished video: complete segments, with which a killed render continues.
 
 `clip.mp4.part` stands beside `clip.mp4` until that is complete. It holds `frames/`, the segments (a
 clip of some frames that plays, or an image per frame), `settings.json`, what the video is rendered
@@ -45,7 +45,7 @@ class Part:
     settings : mapping
         Everything that decides the pixels, by name.
     resume : bool
-        Continue what is there, if anything is. Otherwise it is removed.
+        Continue an unfinished video if there is one. Otherwise remove it.
     overwrite : bool
         Replace an older video that was not written here.
 
@@ -194,7 +194,7 @@ class Part:
         os.close(self._lock)
 
     def _compare(self, settings: Settings) -> None:
-        """Raise `VideoError` naming the first setting in which the interrupted video differs."""
+        """Raise `VideoError` with the first setting that differs from the interrupted video."""
         old = json.loads((self.folder / SETTINGS).read_text())
         new = json.loads(json.dumps(settings))
         for name in sorted({*old, *new}):
@@ -221,7 +221,7 @@ class Part:
             )
 
     def _strangers(self) -> Iterator[str]:
-        """Names of what no writer has put here, in the folder and in that of the segments."""
+        """Names of foreign files, in the folder and in the folder of the segments."""
         ours = MARK in read_object(self.folder / SETTINGS)
         for entry in self.folder.iterdir():
             own = is_plain(entry) and entry.name.lstrip(".") in (SETTINGS, STATES, _WHOLE)

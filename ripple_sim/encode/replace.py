@@ -40,7 +40,7 @@ def is_plain(path: Path) -> bool:
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """What a JSON file says; nothing where it is missing, damaged, no plain file or no object."""
+    """The object in a JSON file; empty if the file is missing, damaged, special or no object."""
     try:
         found = json.loads(path.read_text()) if path.is_file() else None
     except (

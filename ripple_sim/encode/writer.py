@@ -37,7 +37,7 @@ class FrameWriter:
     The frames are stored as segments of a `Part`, which are joined at the end.
 
     Use it as a context manager: leaving it normally closes it, leaving it by an exception ends it.
-    A resumable writer then keeps what is finished, unless the same exception would occur again.
+    A resumable writer keeps finished frames, unless the same exception would occur again.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ class FrameWriter:
             self._give_up(error)
 
     def _give_up(self, error: BaseException) -> None:
-        """End the work on an exception, and add a note of what is kept."""
+        """End the work on an exception, and add a note that names the kept files."""
         # these errors would occur again when the render is resumed
         if not self._resumable or isinstance(error, (SimulationError, SolverError)):
             self.discard()
@@ -185,7 +185,7 @@ class FrameWriter:
     def _run(self) -> None:
         """Encode the frames of the queue, and after the last, at None, finish the video.
 
-        An error is kept instead of ending the thread: it must go on taking frames from the queue,
+        An error is kept instead of ending the thread: it must keep taking frames from the queue,
         or `write` would wait for ever.
         """
         ended = False

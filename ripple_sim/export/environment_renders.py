@@ -164,7 +164,7 @@ class RenderedInPlace:
         self.frames = 0
 
     def renderer(self, width: int, height: int, max_geom: int = _MAX_GEOM) -> RippleRenderer:
-        """The renderer of frames of a size [pixels], whose scene has room for so many geoms."""
+        """The renderer of frames of a size [pixels], with room for some geoms in its scene."""
         kind = width, height, max_geom
         if kind not in self._renderers:
             self._renderers[kind] = RippleRenderer(
@@ -215,7 +215,7 @@ class RenderedInPlace:
         return viewers[mode]
 
     def update_scene(self, drawn_by: mujoco.Renderer, *args: Any, **kwargs: Any) -> None:
-        """Take in the scene in place of a `mujoco.Renderer`."""
+        """Update the scene as a `mujoco.Renderer` does."""
         renderer = self.renderer(drawn_by.width, drawn_by.height)
         renderer.update_scene(*args, **kwargs)
         self._taken_in.add(drawn_by)
@@ -230,7 +230,7 @@ class RenderedInPlace:
         return self.renderer(drawn_by.width, drawn_by.height).scene
 
     def render(self, drawn_by: mujoco.Renderer, out: NDArray | None) -> NDArray:
-        """Draw the frame in place of a `mujoco.Renderer`."""
+        """Draw the frame as a `mujoco.Renderer` does."""
         renderer = self.renderer(drawn_by.width, drawn_by.height)
         renderer.disable_depth_rendering()
         renderer.disable_segmentation_rendering()

@@ -327,7 +327,7 @@ def export_scene(
     ----------
     scene : Scene
     output : path
-        Its ending says what is written, see `Exporter`. The file appears once it is complete.
+        Its ending chooses the format, see `Exporter`. The file appears once it is complete.
     options : ExportOptions
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.

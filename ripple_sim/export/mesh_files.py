@@ -55,7 +55,7 @@ class MeshWriter(Writer):
         self._content = b""
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
-        """Take a frame in place of the one before."""
+        """Replace the previous frame."""
         self._content = self._frames.content(data)
 
     def finish(self) -> None:

@@ -46,9 +46,9 @@ class ExportOptions(SceneOptions):
     """Colour rippling surfaces by height in meshes, from blue to red: metres at which the colours
     end, or auto, the greatest height in each file."""
     signals: bool = False
-    """Write the samples of the scene's sensors, in place of impulses (.csv, .parquet)."""
+    """Write the samples of the scene's sensors instead of impulses (.csv, .parquet)."""
     sound: bool = False
-    """Write what is heard at the camera also where the scene has sensors (.wav)."""
+    """Write the sound at the camera even if the scene has sensors (.wav)."""
     replay: bool = False
     """Write a page that plays recorded heights, and does not solve the waves itself (.html)."""
     chunk: int | None = None

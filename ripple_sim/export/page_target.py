@@ -145,7 +145,7 @@ class PageTarget:
         return None, coded
 
     def motion(self) -> dict[str, Any]:
-        """The mesh at rest, and the way in which the page's points ride on it."""
+        """The mesh at rest, and the triangles and weights that move the page's points."""
         corners, weights, off, _, _ = self._surface.vertices.rest
         points = self.part.vertices
         far = max(float(np.abs(off).max()), 1e-30)  # largest offset from the mesh [m]

@@ -1,4 +1,4 @@
-"""`RippleRenderer` renders the frames of a loop of one's own, in place of `mujoco.Renderer`."""
+"""`RippleRenderer` renders the frames of a user's loop instead of `mujoco.Renderer`."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ class RippleRenderer:
     ) -> None:
         """Take in the present state of bodies and ripples, which `render` draws.
 
-        Later changes of the data and the ripples have no effect on what is drawn.
+        Later changes of the data and the ripples have no effect on the frame.
 
         Parameters
         ----------
@@ -251,7 +251,7 @@ class RippleRenderer:
         data, camera : optional
             As for `update_scene`, which is then called first.
         out : array, optional
-            Of the shape of what is returned: gets the result, whatever its type.
+            Array of the result's shape and of any type: receives the result.
 
         Returns
         -------
@@ -308,7 +308,7 @@ class RippleRenderer:
         return out
 
     def close(self) -> None:
-        """Release what is on the GPU; nothing can be rendered afterwards.
+        """Release the objects on the GPU; nothing can be rendered afterwards.
 
         Repeated calls do nothing.
 
@@ -388,7 +388,7 @@ class RippleRenderer:
         return np.float32(self.model.vis.map.zfar * self.model.stat.extent)
 
     def _empty_frame(self) -> NDArray:
-        """What `render` returns where nothing is."""
+        """The value of `render` at pixels without an object."""
         size = self.height, self.width
         if self._shows == "colours":
             return np.zeros((*size, 3), np.uint8)

@@ -22,7 +22,7 @@ from .moving_mesh import MovingMesh
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Source:
-    """What is recorded.
+    """The recorded data of a frame.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Source:
     output : Path
         Of a run in chunks; beside it stands NAME.part with the complete ones until all is complete.
     settings : mapping, optional
-        Everything that decides what is written, by name. With it complete chunks survive an
+        All settings that the output depends on, by name. With them complete chunks survive an
         interruption.
     resume : bool
         Keep those that are there.

@@ -132,7 +132,7 @@ class UsdWriter:
             self._binary.unlink()
 
     def close(self) -> str:
-        """Give up what is not saved; say what is kept of an unfinished run, if anything."""
+        """Drop unsaved frames; return a note about kept files of an unfinished run, if any."""
         return "" if self._chunks is None else self._chunks.close()
 
     def _begin(self, data: mujoco.MjData) -> None:
@@ -140,7 +140,7 @@ class UsdWriter:
         pose = self._source.pose(data)
         width, height = self._source.size
         half_width, half_height = pose.half_sizes(width / height)
-        # of an orthographic camera the aperture is what it sees, and it has no lens
+        # the aperture of an orthographic camera is the width of its view; it has no lens
         focal = 1.0 if pose.orthographic else _FILM_HEIGHT / 2 / half_height
         lens = 0.0 if pose.orthographic else self._source.camera.aperture
         near, far = pose.clip or (_NEAR_PLANE * pose.distance, _FAR_PLANE * pose.distance)

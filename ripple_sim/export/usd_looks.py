@@ -121,7 +121,7 @@ class Lamps:
                 _set_light(lamp, light.radiance, np.pi, light.gloss)
                 # [W/m^2], as Blender has it
                 keep(lamp.GetPrim(), "power", np.pi * light.radiance.max())
-                keep(lamp.GetPrim(), "angle", angle)  # [radians], likewise
+                keep(lamp.GetPrim(), "angle", angle)  # [radians]
             else:
                 lamp = UsdLux.SphereLight.Define(self._stage, path)
                 lamp.CreateRadiusAttr(max(light.size, _MIN_LAMP_RADIUS))

@@ -1,4 +1,4 @@
-"""What a page needs to solve the waves of a target itself: the solver's law, texel by texel.
+"""The solver's law, texel by texel, for a page that solves the waves of a target.
 
 html/law.js reads what is written here and states the law.
 """

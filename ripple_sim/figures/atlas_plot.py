@@ -402,7 +402,7 @@ def stretch_shade(stretch: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def chart_colors(topology: TexelTopology) -> NDArray[np.float64]:
-    """A pale colour for each chart, [C, 3], never that of a chart beside it."""
+    """A pale colour for each chart, [C, 3]; neighbouring charts differ."""
     hues = np.full(len(topology.glued), -1)
     for chart, corners in enumerate(topology.corners):
         near = hues[np.isin(topology.corners, corners).any(axis=1)]

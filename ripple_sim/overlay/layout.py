@@ -45,7 +45,7 @@ class Layout:
         return max(2.6 * self.scale, 1.3)
 
     def panel_width(self, ems: float) -> int:
-        """Width of a panel [pixels], of which two must fit side by side."""
+        """Width of a panel [pixels]; two panels must fit side by side."""
         return min(round(ems * self.em), (self.width - 3 * self.margin) // 2)
 
     def place(self, corner: str, width: int, height: int) -> tuple[int, int]:

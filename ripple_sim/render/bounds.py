@@ -1,4 +1,4 @@
-"""Balls that bound what is drawn, and the boxes about balls in a frame.
+"""Bounding balls of drawn objects, and the boxes about balls in a frame.
 
 Balls are float64 [k, 4]: centre in the world and radius [m], which may be infinite.
 """

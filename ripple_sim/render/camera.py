@@ -53,7 +53,7 @@ class Camera:
             values = np.array(
                 [*self.lookat, self.distance, self.azimuth, self.elevation, self.fovy]
             )
-        except (TypeError, ValueError):  # no sequence, or sequences in place of numbers
+        except (TypeError, ValueError):  # no sequence, or sequences instead of numbers
             values = np.array(None)
         valid = values.shape == (7,) and values.dtype.kind in "iuf" and np.isfinite(values).all()
         if not (valid and self.distance > 0 and 0 < self.fovy < 180):

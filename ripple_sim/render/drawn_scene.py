@@ -31,7 +31,7 @@ class DrawnScene:
     Parameters
     ----------
     targets : mapping
-        Target to the surface that is drawn in place of it.
+        Target to the surface that is drawn instead of the target.
     size : (width, height)
         Size of the frame [pixels].
 
@@ -65,7 +65,7 @@ class DrawnScene:
         paints: Mapping[TargetId, Visual] | None = None,
         hidden: Sequence[TargetId] = (),
     ) -> None:
-        """Choose what is drawn from now on.
+        """Choose the objects that are drawn from now on.
 
         Parameters
         ----------

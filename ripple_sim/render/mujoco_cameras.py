@@ -132,7 +132,7 @@ def pose_of_mjcf_camera(model: mujoco.MjModel, data: mujoco.MjData, name: str | 
 def pose_in_mujoco(
     model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera, distance: float
 ) -> Pose:
-    """Pose with the view that an `MjvCamera` has in MuJoCo; `distance` is that of the focus [m]."""
+    """Pose with the view of an `MjvCamera` in MuJoCo; `distance` is that of the focus [m]."""
     scene = mujoco.MjvScene()
     mujoco.mjv_updateCamera(model, data, camera, scene)
     return pose_of_scene(scene.camera, distance)

@@ -47,12 +47,12 @@ class Pose:
     focal_distance : float
         Distance of the plane in focus [m].
     orthographic : bool
-        Whether rays are parallel, in place of a perspective view.
+        Whether the view is orthographic instead of perspective.
     centre : tuple of float
         Offset of the frame's middle from the camera's axis (to the right, up) [m]. In perspective
         it is measured one metre in front of the eye; with parallel rays it is the same everywhere.
     half_width : float, optional
-        Half the width of the frame, measured likewise [m]; by default pixels are square.
+        Half the width of the frame, measured in the same way [m]; by default pixels are square.
     clip : tuple of float, optional
         Distances of the near and the far plane [m]; by default they follow the distance of the
         focus.

@@ -88,7 +88,7 @@ class Renderer:
     gl : GLContext
     model : mujoco.MjModel
     targets : mapping
-        Geom id to the surface that is drawn in place of the geom.
+        Geom id to the surface that is drawn instead of the geom.
     size : (width, height)
         Size of a frame [pixels].
     samples : int

@@ -49,7 +49,7 @@ class ShownScene:
     ----------
     model : mujoco.MjModel
     targets : iterable of int
-        Geom ids of the rippling surfaces, which are drawn in place of their geoms.
+        Geom ids of the rippling surfaces, which are drawn instead of their geoms.
     floor : int, optional
         Geom id of the plane that is drawn as the floor, if it is opaque and seen from above.
     cut_out : bool

@@ -40,7 +40,7 @@ class CameraKey(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     distance: float | None = None
     """From there [m]."""
     azimuth: float | None = None
-    """As in `[camera]` [degrees]; a turn goes on beyond 360: from 350 to 370, not to 10."""
+    """As in `[camera]` [degrees]; a turn continues beyond 360: from 350 to 370, not to 10."""
     elevation: float | None = None
     """Likewise."""
     fovy: float | None = None
@@ -82,7 +82,7 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     """What stays sharp: a distance along the camera's axis [m], the name of a body or a geom, or a
     point in the world [m]; by default the point that the camera looks at."""
     exposures: int = 32
-    """Images of which a frame is the mean where `shutter` or `aperture` is not 0; at most 1024."""
+    """Images whose mean is a frame, where `shutter` or `aperture` is not 0; at most 1024."""
     key: list[CameraKey] = []
     """Path of the free camera, see below."""
 

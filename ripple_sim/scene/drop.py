@@ -135,7 +135,7 @@ def drop_scene(
     look : str
         Of the target.
     texture : path, optional
-        Image in place of the look's colour; by default see `mesh_image`.
+        Image instead of the look's colour; for the default see `mesh_image`.
     edit : callable, optional
         Changes the model's specification in place, before it is compiled.
     **reading : bool
@@ -185,7 +185,7 @@ def drop_scene(
 def _slenderness(mesh: Mesh, extent: Extent) -> float:
     """Radius over length of a tube as slender as a mesh.
 
-    A tube has as much surface a length as a strip, which is what a hit can set in motion.
+    A tube has as much surface per length as a strip, and a hit sets this surface in motion.
     """
     rim_length = 0.0
     for rim in mesh.rims:
@@ -260,7 +260,7 @@ def _camera(
     corners = V[:: -(-len(V) // _VIEW_POINTS)]
     upper = points[points[:, 2] >= np.quantile(points[:, 2], 0.9)]
     base = points[points[:, 2] <= np.quantile(points[:, 2], 0.1)]
-    # direction of what is uppermost, or leans out, from the middle of the base
+    # direction from the middle of the base to the part that is uppermost, or leans out
     head = (upper.mean(axis=0) - base.mean(axis=0))[:2] / SIZE
     is_top = normals[:, 2] > _MIN_TOP_NORMAL
     # number of the direction of each normal, in boxes of 2/3

@@ -113,7 +113,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def _warn_of_late_events(scene: Scene) -> None:
-    """Warn of each kind of event of which some are not before the scene's end."""
+    """Warn of each kind of event with events after the scene's end."""
     for field in dataclasses.fields(scene.events):
         times = [event.time for event in getattr(scene.events, field.name)]
         late = [time for time in times if time >= scene.duration]
@@ -201,7 +201,7 @@ def _check_layer_and_maps(entry: RippleEntry) -> None:
 
 
 def _check_image(key: str, path: str, valid: str) -> None:
-    """Refuse an image that does not exist; `valid` is what the key may hold."""
+    """Refuse an image that does not exist; `valid` describes the values of the key."""
     if not Path(path).is_file():
         raise SceneError(
             f"{key} names the image {path!r}, which does not exist: it must be {valid}"
@@ -232,9 +232,9 @@ def check_files(path: Path) -> None:
                     f"column {column}: MuJoCo would cut the text there; names must be without a "
                     "NUL"
                 ) from error
-            continue  # MuJoCo says what is wrong
+            continue  # MuJoCo reports the fault
         except (OSError, ValueError, LookupError, RecursionError):
-            continue  # likewise
+            continue  # MuJoCo reports the fault
         for compiler in root.iter("compiler"):
             folders |= {path.parent / compiler.get(name, "") for name in _FOLDERS}
         for element in root.iter():
@@ -269,7 +269,7 @@ def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
     try:
         bodies = math.prod(int(count) for count in flex.get("count", "").split())
     except ValueError:
-        return  # MuJoCo says what is wrong
+        return  # MuJoCo reports the fault
     seconds = _MEASURED_SECONDS * (bodies / _MEASURED_BODIES) ** _GROWTH_POWER
     if seconds > _MAX_SILENCE:
         warn_caller(
@@ -407,11 +407,11 @@ def load_model(
             f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file"
         )
     check_files(path)
-    # a NaN is told once: by the errors below, or by MuJoCo's warning where none of them sees it
+    # a NaN is reported once: by an error below, or by MuJoCo's warning where no error sees it
     with warnings.catch_warnings(record=True) as caught, refusal_of(repr(str(path))):
         warnings.simplefilter("always")
         spec = mujoco.MjSpec.from_file(str(path))
-        # the compiler fills up what is missing
+        # the compiler fills in missing values
         keys = [(key.name, len(key.qpos)) for key in spec.keys]
         shifts = {} if random is None else randomize(spec, random)
         if edit is not None:
@@ -438,7 +438,7 @@ def load_model(
 def refusal_of(name: str) -> Iterator[None]:
     """Turn MuJoCo's refusal of a model into a `SceneError`, and its warnings into ours.
 
-    `name` is what messages call the model.
+    `name` is the model's name in messages.
     """
     adopt_warnings()
     try:

@@ -64,7 +64,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     """Whether the mean of every push is taken out, so that the surface keeps its volume; by default
     on closed surfaces, and on open ones that no rim, clamp or stiffness holds."""
     look: str = "rubber"
-    """What the surface looks made of; `model` as the MJCF's material says."""
+    """Look of the surface; `model` is the look of the MJCF's material."""
     color: Color | None = None
     """sRGB, 0 to 1; by default the texture or colour that the MJCF gives the geom, or else the
     look's."""
@@ -75,14 +75,14 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     still_map: str | None = None
     """Path of an image in the mesh's own texture coordinates: no waves where it is black."""
     inside: list[InsideEntry] = []
-    """What lies under a layer, see below."""
+    """The body under a layer, see below."""
     height: HeightEntry | None = None
     """The shape of the surface at the beginning, see below; by default it is flat."""
     thickness_limits: tuple[float, float] = (0.0, math.inf)
     """Least and greatest thickness of a layer over what is inside [m]: beyond them it counts as
     these."""
     contacts: list[str] | None = None
-    """Geoms that collide for a geom that is only visible; by default those of its body."""
+    """Geoms that collide for a geom that is only visible; by default the geoms of its body."""
     high_pass: bool = False
     """Whether a flex keeps to itself the coarse motion that contacts give it; its waves get the
     fine rest."""
@@ -92,9 +92,9 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     modulus: float | None = None
     """For `hertz`: E* of the two materials [Pa], 1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2."""
     limit: bool = True
-    """Bend heights that are too large for the object where they are drawn, and warn of them."""
+    """Limit drawn heights that are too large for the object, and warn of them."""
     warn: bool = True
-    """Whether to warn of them."""
+    """Whether to warn of such heights."""
 
     def located(self, folder: Path) -> RippleEntry:
         """The same with its files' paths made relative to a folder."""
@@ -119,7 +119,7 @@ class SensorEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     """`[[sensor]]`: a signal from a target's surface, at a site or at points."""
 
     name: str
-    """What it is called in overlays and exports."""
+    """Name in overlays and exports."""
     geom: str
     """The target."""
     site: str | None = None
@@ -127,7 +127,7 @@ class SensorEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     point: Vector | None = None
     """In the frame of the geom's body [m]; the nearest point of the surface is taken."""
     points: list[Vector] = []
-    """Several of them, such as a grid of taxels."""
+    """Several points, such as a grid of taxels."""
     kind: str = "acceleration"
     """`acceleration`, `velocity`, `height` or `strain`."""
     rate: float = 48_000.0
@@ -175,7 +175,7 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
 def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
     """Check a scene's table against the schema.
 
-    Raises `SceneError` naming the place, the value and what is valid.
+    Raises `SceneError` with the place, the value and the expected values.
     """
     what = f"scene file {origin!r}"
     check_keys(table, SceneFile, what)
@@ -272,7 +272,7 @@ def uniform_material(entry: RippleEntry) -> Material:
 
 
 def apply_maps(ripples: Ripples, entry: RippleEntry) -> None:
-    """Give a target the coefficients that vary over it, and hold still what is to be still.
+    """Give a target the coefficients that vary over it, and hold its still regions.
 
     Raises `RippleError` if a file cannot be read, or does not suit the target.
     """

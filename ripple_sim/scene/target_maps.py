@@ -269,7 +269,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
                 )
 
     def body(self) -> Mesh | Volume:
-        """What is inside, in the frame of the geom's body.
+        """The inner body, in the frame of the geom's body.
 
         Raises `MeshError` if the file cannot be read.
         """
@@ -298,7 +298,7 @@ def load_inside(
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     scale: float = 1.0,
 ) -> Mesh | Volume:
-    """Read what lies inside: a volume where the path is that of one, else a mesh; scaled.
+    """Read the inner body, scaled: a volume if the path has a volume's ending, else a mesh.
 
     Raises
     ------

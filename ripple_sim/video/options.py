@@ -97,7 +97,7 @@ class VideoOptions(SceneOptions):
     sensors. Examples: height,contacts,time or velocity=0.5,energy, where the colours end at 0.5
     m/s."""
     sound: bool = False
-    """Add what is heard at the camera to the video (.mp4 and .webm)."""
+    """Add the sound at the camera to the video (.mp4 and .webm)."""
     compare: str | None = None
     """Also run the scene with this wave operator and show both side by side."""
     resume: bool = False

@@ -336,7 +336,7 @@ def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
     """Run an iterable in a thread, at most `depth` items ahead.
 
     The context is an iterator over the same items, in their order; only the thread runs the
-    iterable. An exception of the iterable is raised in place of its next item. Leaving the block
+    iterable. An exception of the iterable is raised instead of its next item. Leaving the block
     stops the thread at its current item.
     """
     iterator = iter(items)

@@ -37,7 +37,7 @@ EXPOSURE = ("shutter", "aperture", "focus", "exposures")
 
 
 def origin(scene: Scene, options: SceneOptions) -> dict[str, str | int]:
-    """What decides the waves of a video or an export, by the names in messages.
+    """Settings that the waves of a video or an export depend on, by the names in messages.
 
     It consists of options, the fingerprint of the scene and the versions of packages.
     """
@@ -128,7 +128,7 @@ def chosen_context(options: VideoOptions) -> GLContext:
 
 
 def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLContext) -> Settings:
-    """What decides the pixels of a video, by the names in messages.
+    """Settings that the pixels of a video depend on, by the names in messages.
 
     The options are settled, and the scene has the exposure that they ask for.
     """

@@ -138,7 +138,7 @@ class Recorder:
     def add(self, frame: NDArray[np.uint8]) -> bool:
         """Add a frame, or end the video if the window has changed its size.
 
-        Return whether it goes on.
+        Return whether the run continues.
 
         Raises
         ------

@@ -130,7 +130,7 @@ class RippleViewer:
 
     @property
     def pert(self) -> mujoco.MjvPerturb:
-        """What the mouse has selected, and how it pulls."""
+        """The selection of the mouse, and the way it pulls."""
         return self._handle.perturb
 
     def sync(self, state_only: bool = False) -> None:

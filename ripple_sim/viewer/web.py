@@ -64,7 +64,7 @@ def new_secret() -> str:
 
 
 def is_local(host: str) -> bool:
-    """Whether what listens at a host is reached from this machine alone."""
+    """Whether a server at a host can be reached from this machine alone."""
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -72,7 +72,7 @@ def is_local(host: str) -> bool:
 
 
 def address(host: str, port: int, secret: str) -> str:
-    """What to open in a browser."""
+    """The address to open in a browser."""
     name = host
     if host in ("0.0.0.0", "::"):
         name = socket.gethostname()
@@ -82,7 +82,7 @@ def address(host: str, port: int, secret: str) -> str:
 
 
 def exposure(host: str, folder: Path) -> str:
-    """What is open to others where a host is not local, in one line."""
+    """A warning in one line for a host that is not local: what others can reach."""
     return (
         f"ripple-sim: --host {host} lets other machines connect: whoever has the address sees and "
         f"drives this scene, and writes screenshots and videos to {folder.absolute()}; nothing is "

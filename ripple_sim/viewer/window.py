@@ -394,7 +394,7 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
 def check_display() -> None:
     """Check that a window can be opened.
 
-    Raises `DisplayError` with what is missing and the alternatives.
+    Raises `DisplayError` with the missing part and the alternatives.
     """
     problem = display_problem()
     if problem:

@@ -1,4 +1,4 @@
-"""The choice of a backend by name, or by what is faster on this machine."""
+"""The choice of a backend by name, or by speed on this machine."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def checked_threads(threads: int | None) -> int | None:
 
 
 def thread_count(texels: int, threads: int | None) -> int:
-    """Threads that step a surface: those asked for, else as many as pay on these cores."""
+    """Threads that step a surface: the given number, or the fastest number on these cores."""
     if numba.config.DISABLE_JIT:
         return 1
     if threads is not None:
@@ -109,7 +109,7 @@ class Team:
     texels : int
         Size of the surface.
     threads : int, optional
-        How many threads, whatever they cost. By default as many as pay: see `Pace`.
+        Number of threads. By default the number that is fastest: see `Pace`.
     """
 
     def __init__(self, texels: int, threads: int | None) -> None:
@@ -128,7 +128,7 @@ class Team:
 
 
 def run_together(task: Callable[[Crew], object], size: int) -> None:
-    """Run a task in `size` threads at once, of which the calling thread is the first.
+    """Run a task in `size` threads at once; the calling thread is the first.
 
     Where another step has the threads, the calling thread does all of the task.
     """

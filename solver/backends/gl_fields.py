@@ -371,7 +371,7 @@ class DeviceProbes:
         shader["drifted"] = drifted
         bind_buffers(height, velocity, self._rows, self._entries, self._sums, dent)
         shader.run(self._count)
-        self._gl.barrier()  # later substeps write what is read here
+        self._gl.barrier()  # later substeps overwrite the values read here
 
     def read(self) -> NDArray[np.float32]:
         """The sums of all substeps, [substeps, k]."""

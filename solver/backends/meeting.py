@@ -30,7 +30,7 @@ _give_way = types.ExternalFunction(
 
 
 class Crew(NamedTuple):
-    """The threads that take a step together, as one of them sees them."""
+    """The threads that take a step together, from the view of one thread."""
 
     rank: int  # number of this thread, from 0
     size: int  # number of threads

@@ -104,7 +104,7 @@ def irregular_force(links: Links, i: int, h: Floats32) -> np.float32:
 
 
 class Share(NamedTuple):
-    """What one thread does of a step."""
+    """One thread's share of a step."""
 
     first_row: int  # of all charts' rows
     last_row: int  # the row after the last

@@ -92,7 +92,7 @@ class SurfaceFields(Generic[Field]):
         return self.crests
 
     def take_crests(self) -> NDArray[np.float32]:
-        """Copy of the crests [m], [C, n, n], which begin anew at 0."""
+        """Copy of the crests [m], [C, n, n]; the crests restart at 0."""
         field = self.watched_crests()
         crests = self.layout.read(field)
         self.layout.write(field, np.float32(0))

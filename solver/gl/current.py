@@ -162,7 +162,7 @@ class PlatformCurrent:
         return True
 
     def is_current(self) -> bool:
-        """Whether the context is current, if nothing but this object changed what is current."""
+        """Whether the context is current, if only this object changes the current one."""
         return self._is_current
 
     def leave(self) -> None:
@@ -189,7 +189,7 @@ def release_current() -> None:
 def leave_current() -> Restore:
     """Leave the context that is current in this thread, so that one of ours can be made current.
 
-    The returned function makes the context current again, in place of ours.
+    The returned function makes the context current again instead of ours.
     """
     previous = EGLCurrent.of_thread() if egl_exists() else None
     if previous is None:

@@ -69,7 +69,7 @@ def matched(
     # the inside is towards smaller angles at a side that runs forward, else towards larger ones
     turn = np.where(forward[one], angle[first] - angle[second], angle[second] - angle[first])
     inner_angle = turn % (2 * np.pi)
-    # 0 where the surface goes on straight, 1 where one triangle lies on the other
+    # 0 where the surface continues straight, 1 where one triangle lies on the other
     bend = np.abs(np.pi - inner_angle) / np.pi
     # of two equal bends the convex one is better: bodies that touch along an edge stay two
     cost = bend + _CONVEX_WEIGHT * inner_angle + sheets_differ + 2.0 * windings_differ
@@ -283,7 +283,7 @@ def cut_apart(
 
 
 def _fans(F: NDArray[np.int64], pairs: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The fan of triangles to which each corner belongs [3 m]; joined sides link corners.
+    """The fan of triangles of each corner [3 m]; joined sides link corners.
 
     `pairs` [k, 2] are the joined sides, numbered 3 x triangle + side.
     """

@@ -76,7 +76,7 @@ def _polygons_with_folded_fans(
     triangles: NDArray[np.int64],
     polygon_of: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """Polygons of which a fan's triangle faces against the sum of all: they are not convex."""
+    """Polygons that are not convex: a triangle of their fan faces against the sum of all."""
     large = np.flatnonzero(sizes[polygon_of] > 3)
     a, b, c = (points[triangles[large, k]] for k in range(3))
     # values that are not finite are refused later, by name

@@ -81,7 +81,7 @@ class Volume:
 
 
 def is_volume(path: str | Path) -> bool:
-    """Whether a path is that of a volume, by its ending, or a folder, as a DICOM series is."""
+    """Whether a path names a volume, by its ending, or a folder, such as a DICOM series."""
     return str(path).lower().endswith(VOLUME_ENDINGS) or Path(path).is_dir()
 
 

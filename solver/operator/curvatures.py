@@ -39,7 +39,7 @@ def neighbours(topology: TexelTopology) -> Ints:
 
 
 def regular_texels(topology: TexelTopology) -> NDArray[np.bool_]:
-    """Texels with eight different neighbours to which they are neighbours as well, [C, n, n]."""
+    """Texels with eight different neighbours that have them as neighbours too, [C, n, n]."""
     around = neighbours(topology).reshape(NEIGHBOURS, -1)
     count = topology.texel_count
     ordered = np.sort(around, axis=0)

@@ -135,7 +135,7 @@ class FluidOperator(WaveOperator):
     def longest_timestep(self) -> float:
         """The stable step [s]; springs need no shorter one.
 
-        So much of the fluid moves with long waves that they are slow, whatever pulls them back.
+        So much of the fluid moves with long waves that they are slow under any restoring force.
         """
         return self.stable_timestep
 

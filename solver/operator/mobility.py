@@ -21,7 +21,7 @@ from .curvatures import Curvatures
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mobility:
-    """What of a surface sources may move; it stays as it is at rest while the surface moves.
+    """The part of a surface that sources may move; it stays as at rest while the surface moves.
 
     Parameters are as of `WaveOperator`. Everything is worked out when it is first asked for.
     """
@@ -126,7 +126,7 @@ class Mobility:
     def keeps_volume(self) -> Bools:
         """Whether each part keeps its volume by default, [p]: it is closed, or nothing holds it.
 
-        A closed surface encloses an incompressible body, whatever springs or clamps it has. An open
+        A closed surface encloses an incompressible body, with any springs or clamps. An open
         one encloses nothing. Its mean height is kept where nothing else would stop it: no rim,
         clamp or spring.
         """

@@ -1,4 +1,4 @@
-"""The modes of a surface: shapes in which it swings by itself, with frequencies and decay times."""
+"""The modes of a surface: shapes of free vibration, with frequencies and decay times."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ _LEAST_AREA_RATIO = 1e-3
 
 
 class MovingOperator:
-    """Makes the operator of a material anew wherever the texels are.
+    """Recomputes the operator of a material at new positions of the texels.
 
     The mass sigma A of each texel stays as it is at rest. So its density falls as its area grows,
     and with the density fall tension sigma c^2 and viscous resistance sigma nu. Rates, speeds and

@@ -215,7 +215,7 @@ def plate_bending(
 
 
 def shared_cells(texels: TexelMesh) -> csr_array:
-    """Number of cells that two texels share, [T, T]; on the diagonal those of a texel, plus 1."""
+    """Number of cells that two texels share, [T, T]; on the diagonal a texel's cells plus 1."""
     topology = texels.topology
     count = texels.topology.texel_count
     halo = np.where(topology.rim, -1, topology.halo)
@@ -252,7 +252,7 @@ def _outer_texels(places: RimPlaces, soft: Bools, near: csr_array) -> Bools:
 def _regular_weights(
     texels: TexelMesh, regular: Bools, stiff: Floats, poisson: float
 ) -> tuple[Floats, Floats]:
-    """Weights of `Curvatures`, and the share of them that ridges leave, [T].
+    """Weights of `Curvatures`, and the share of the curvature that ridges leave, [T].
 
     The share is 1 except at the regular texels.
     """
@@ -397,7 +397,7 @@ def _curvature_weights(
 
 
 def _bending_rows(fits: Fits, stiff: Floats, poisson: float, ridge: float) -> tuple[Rows, Floats]:
-    """The curvatures of fits as rows, and the share of them that ridges leave, [o]."""
+    """The curvatures of fits as rows, and the share of each that ridges leave, [o]."""
     curved, kept = _curvature_weights(fits, stiff, poisson, ridge)
     matrix = _row_matrix(curved, fits.columns, len(stiff))
     return Rows(matrix, np.repeat(fits.texels, KINDS)), kept

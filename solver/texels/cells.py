@@ -192,7 +192,7 @@ def hourglass(pp: Numbers, qq: Numbers, pq: Numbers, area: Numbers) -> Numbers:
 
 @shared
 def quad_area(e: Vector, n: Vector, p: Vector) -> Numbers:
-    """Area of a quad, see `quad`, that need not be flat: that of its smaller triangulation.
+    """Area of a quad, see `quad`, which need not be flat: the smaller of its triangulations.
 
     The flat area p x q / 2 misses what a fold holds, the other triangulation spans it twice.
     """

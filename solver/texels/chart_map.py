@@ -43,7 +43,7 @@ class ChartMap(Protocol):
         """
 
     def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
-        """Flat indices [k] of the texels in which points [k, 3] [m] on triangles [k] lie."""
+        """Flat indices [k] of the texels that contain points [k, 3] [m] on triangles [k]."""
 
     def linear_parts(self, mesh: Mesh) -> Parts:
         """Parts of the mesh's triangles in which map coordinates are linear.
@@ -64,7 +64,7 @@ class ChartMap(Protocol):
         """Figures of merit of the map itself; see `Atlas.quality`."""
 
     def arrays(self) -> dict[str, NDArray]:
-        """Arrays from which the chart map can be made again."""
+        """Arrays that the chart map can be rebuilt from."""
 
 
 def uncut(values: NDArray) -> Parts:
@@ -99,7 +99,7 @@ class TextureCoordinates:
     uv: Floats
 
     def carry(self, corner_values: Floats) -> Floats:
-        """Values at the pieces' corners of what is linear in each triangle of the mesh.
+        """Values at the corners of pieces of a function that is linear in each triangle.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class LinearChartMap:
         return coordinates[:, 0].astype(np.int64), coordinates[:, 1], coordinates[:, 2]
 
     def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
-        """Flat indices [k] of the texels in which points [k, 3] [m] on triangles [k] lie."""
+        """Flat indices [k] of the texels that contain points [k, 3] [m] on triangles [k]."""
         charts = self.charts[triangles]
         corners = np.ascontiguousarray(self.corners[triangles])
         return _texels_on_charts(mesh.V[mesh.F[triangles]], charts, corners, resolution, points)

@@ -117,7 +117,7 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
 
 
 def _along_sides(along: Ints, width: int) -> Ints:
-    """Flat places along each side of a square of so many rows and columns, [4, n]."""
+    """Flat places along each side of a square with n rows and columns, [4, n]."""
     last = width - 1
     return np.stack(
         [along, along * width + last, last * width + last - along, (last - along) * width]

@@ -93,7 +93,7 @@ class SurfaceRide:
         return around[:, 1:-1, 1:-1].copy(), around if self._has_beyond else None
 
     def normals(self, vertex_normals: Floats) -> Floats:
-        """Unit normals of the texels [C, n, n, 3], from those of the vertices [n, 3]."""
+        """Unit normals of the texels [C, n, n, 3] from normals of the vertices [n, 3]."""
         charts, width, _ = self._shape
         normals = np.empty((charts, width - 2, width - 2, 3))
         _interpolate_units(vertex_normals, self.corners, self.weights, normals)

@@ -34,7 +34,7 @@ _ALL = slice(None)
 _HERE = slice(None, -1)
 _NEXT = slice(1, None)
 
-# The same of both ends of each of the four links, as indices of a field [C, n + 2, n + 2].
+# Both ends of each of the four links, as indices of a field [C, n + 2, n + 2].
 LINK_ENDS = [
     [(_ALL, _HERE, _HERE), (_ALL, _HERE, _NEXT)],
     [(_ALL, _HERE, _HERE), (_ALL, _NEXT, _HERE)],
@@ -63,7 +63,7 @@ _MOST_STEPS = 1000
 
 
 class IrregularLinks(NamedTuple):
-    """Links by the texels in which they end; every link is stored for both of its ends.
+    """Links by the texels where they end; every link is stored for both ends.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ def link_lengths(topology: TexelTopology, halo_positions: Floats) -> Floats:
 
 
 def link_exists(topology: TexelTopology, link: int) -> Bools:
-    """Where a link joins two texels of which one is the chart's own, [C, n + 1, n + 1]."""
+    """Links between two texels that include a texel of the chart, [C, n + 1, n + 1]."""
     a, b = LINK_ENDS[link]
     there = (topology.halo >= 0) & ~topology.rim
     return there[a] & there[b] & (topology.own[a] | topology.own[b])

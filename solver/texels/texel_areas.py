@@ -133,7 +133,7 @@ def _add_areas(
 
 @kernel(no_cpython_wrapper=True)
 def _share(corners: Floats, count: int) -> float:
-    """Area of a polygon over the area of the triangle in which it lies.
+    """Area of a polygon over the area of its triangle.
 
     Its corners have barycentric coordinates up to a factor.
     """

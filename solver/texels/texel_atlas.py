@@ -59,7 +59,7 @@ def _welded_nodes(texels: TexelMesh) -> tuple[NDArray[np.float64], NDArray[np.in
     low = np.minimum(own, topology.halo)[border]
     high = np.maximum(own, topology.halo)[border]
     rims = topology.rim[border]
-    # on a rim, and where a periodic surface goes on elsewhere, a node belongs to its place alone
+    # on a rim, and where a periodic surface continues elsewhere, a node belongs to its place alone
     alone = rims | (points[topology.halo[border]] != around[border]).any(axis=1)
     key = np.where(alone, -1 - np.flatnonzero(border), low * count + high)
     _, first, index = np.unique(key, return_index=True, return_inverse=True)

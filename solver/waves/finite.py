@@ -103,7 +103,7 @@ class FiniteGuard:
         self.clear()
 
     def clear(self) -> None:
-        """Begin anew, at rest."""
+        """Restart at rest."""
         self._fastest = -np.inf
         self._largest = ("", 0.0, "", 0.0)
         self._reported = False

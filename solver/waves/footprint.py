@@ -132,7 +132,7 @@ def _weigh(
 
 @kernel(no_cpython_wrapper=True)
 def _spacing(grid: TexelGrid, center: int) -> float:
-    """Greatest distance from a texel to the four beside it."""
+    """Greatest distance from a texel to its four neighbours."""
     halo = grid.halo
     positions = grid.positions
     n = halo.shape[1] - 2

@@ -165,7 +165,7 @@ class HeldLoad:
     def counterpart(
         self, texels: NDArray[np.int64], momenta: NDArray[np.float64]
     ) -> float | NDArray[np.float64]:
-        """What balances momenta, or forces, on some texels, outwards, where volume is conserved."""
+        """Outward momenta or forces that balance those on some texels and conserve the volume."""
         return self.balance.counterpart(texels, momenta)
 
     def upload_again(self) -> None:

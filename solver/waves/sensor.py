@@ -89,7 +89,7 @@ class Listeners:
         return listener
 
     def begin(self, time: float) -> None:
-        """Let all listeners begin anew."""
+        """Restart all listeners."""
         for listener in self.all:
             self._begin(listener, time)
 
@@ -197,7 +197,7 @@ class Sensor:
         return _FILTER_REACH / self._base
 
     def begin(self, time: float, values: NDArray) -> None:
-        """Begin anew at a time [s], with the sums of the probes at that time."""
+        """Restart at a time [s], with the sums of the probes at that time."""
         self._start = self._latest = time
         self._next = 0
         self._last = np.asarray(values, np.float64)

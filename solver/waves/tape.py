@@ -38,14 +38,14 @@ class Tape:
         self.broken = ""
 
     def take(self) -> list[Event]:
-        """The events so far; the tape then begins anew."""
+        """The events so far; the tape is then empty."""
         events = self.events
         self.events = []
         return events
 
 
 class RecordedBackend:
-    """A backend that also tells tapes what it is told; everything else goes to the backend."""
+    """A backend that also passes its calls to tapes; everything else goes to the backend."""
 
     def __init__(self, backend: Backend) -> None:
         self.backend = backend

@@ -161,7 +161,7 @@ class WaveSolver:
         return self.operator.longest_timestep
 
     def step(self, dt: float, substeps: int | None = None, load: StepLoad | None = None) -> None:
-        """Advance by dt [s] in equal substeps, as many as `stable_timestep` asks for.
+        """Advance by dt [s] in equal substeps, each at most `stable_timestep` long.
 
         Parameters
         ----------
@@ -178,7 +178,7 @@ class WaveSolver:
         SolverError
             If dt is negative or not finite, a given number of substeps is too small to be stable, a
             load is not finite or names no texel, or the height is no longer finite: the CPU looks
-            at it every 32 substeps, and both backends look at whatever is read.
+            at it every 32 substeps, and both backends check every value that is read.
         """
         require_finite("time step", dt, "s", least=0.0)
         if dt == 0:

@@ -35,7 +35,7 @@ class Displacement:
         What `KEPT` says of each vertex.
     """
 
-    # buffer, format and names of what is drawn with
+    # buffer, format and names of the vertex attributes
     KEPT = "8x4 3f 3f 2f 3f", "in_normal", "in_baked", "in_place", "in_mapped"
 
     def __init__(

@@ -111,9 +111,9 @@ def split_at_charts(
 def shared_places(
     uv: NDArray[np.float64], places: NDArray[np.float64], points: NDArray
 ) -> NDArray[np.float64]:
-    """Places [n, 2] on the page, equal for vertices at the same point, whatever their charts.
+    """Places [n, 2] on the page, equal for vertices at the same point, in all charts.
 
-    Heights on both sides of a border are equal but for round-off; looked up in one place they are
+    Heights on both sides of a border are equal to round-off; looked up in one place they are
     the same, so that no gap opens. `points` [n, k] are equal where the vertices are at one point.
     """
     border = np.flatnonzero(((uv < _BORDER_WIDTH) | (uv > 1 - _BORDER_WIDTH)).any(axis=1))
@@ -211,7 +211,7 @@ class Surface:
 
     @property
     def open(self) -> bool:
-        """Whether it has a rim."""
+        """Whether the surface has a rim."""
         edges, _ = undirected(np.asarray(self.F, dtype=np.int64))
         return bool((np.unique(edges, return_counts=True)[1] == 1).any())
 

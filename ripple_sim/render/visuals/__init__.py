@@ -1,4 +1,4 @@
-"""What a MuJoCo model shows: geoms, sites, materials, textures, lights."""
+"""The visuals of a MuJoCo model: geoms, sites, materials, textures, lights."""
 
 import lazy_loader
 

@@ -92,7 +92,7 @@ class Light:
     shadow: bool = False
 
     def is_below(self, point: NDArray[np.float64], normal: NDArray[np.float64]) -> bool:
-        """Whether it shines from behind a plane, given by a point and its normal."""
+        """Whether the light shines from behind a plane, given by a point and its normal."""
         towards = self.direction if self.position is None else self.position - point
         return bool(towards @ normal < 0.0)
 
@@ -259,7 +259,7 @@ def sky_colors(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Linear colours [3] of the background at the horizon and overhead, and radiance of the sky.
 
-    The radiance of the sky is what lights surfaces that face it. Parameters as for `set_lighting`.
+    The radiance of the sky lights surfaces that face it. Parameters as for `set_lighting`.
     """
     if not lighting.backdrop:
         return np.zeros(3), np.zeros(3), lighting.ambient

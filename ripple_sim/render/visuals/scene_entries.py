@@ -289,7 +289,7 @@ class EntryPoses:
     def of(self, data: Any) -> Any:
         """Poses of all geoms and sites, as the scene has them.
 
-        They are the data itself if the scene agrees with it but for rounding, else `ScenePoses`.
+        They are the data itself if the scene agrees with it to rounding, else `ScenePoses`.
         """
         geom = self._differing(
             self._geoms, self._geom_ids, data.geom_xpos, data.geom_xmat, planes=True

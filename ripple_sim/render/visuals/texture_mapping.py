@@ -90,7 +90,7 @@ class TextureMapping:
 def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     """How MuJoCo (3.12 and later) lays the texture of a visual's material on it.
 
-    Flat textures go once round what is round, with their left edge in the xz plane where x > 0 and
+    Flat textures go once round a round geom, with their left edge in the xz plane where x > 0 and
     their upper edge towards +z; a cylinder's discs, a capsule's ends and each face of a box carry a
     whole texture of their own. On height fields, and on meshes without texture coordinates, they
     are projected from above.

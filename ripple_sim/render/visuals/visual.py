@@ -177,7 +177,7 @@ class Visual:
 
     @property
     def casts(self) -> bool:
-        """Whether it casts shadows: all but lines and what explains a scene does, as in MuJoCo."""
+        """Whether it casts shadows: all but lines and decorative geoms do, as in MuJoCo."""
         return not self.decor and self.kind != _GEOM.mjGEOM_LINE
 
     @property
@@ -187,7 +187,7 @@ class Visual:
 
     @property
     def colored(self) -> bool:
-        """Whether the model gives it a colour of its own; a material does."""
+        """Whether the model or a material gives the visual a colour."""
         return self.material >= 0 or not np.array_equal(self.rgba[:3], _DEFAULT_RGBA[:3])
 
     @property
@@ -245,7 +245,7 @@ def geom_visual(model: Any, geom: GeomId) -> Visual:
 def paint_of(
     model: Any, target: TargetId, look: str | None
 ) -> tuple[str, tuple[float, float, float] | None]:
-    """Look of a target in a model of the user's, and its sRGB colour.
+    """Look and sRGB colour of a target in a user's model.
 
     The colour is None where the model or the look has one. A target without look and colour is
     rubber in the grey of MuJoCo's geoms without a colour.
@@ -316,7 +316,7 @@ def box_of(model: Any, visual: Visual) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
-    """Bounding ball [1, 4] of a visual in the world; that of an infinite plane is infinite."""
+    """Bounding ball [1, 4] of a visual in the world; infinite for an infinite plane."""
     if visual.corners is not None:
         points = visual.corners[:, :3]
         middle = points.mean(axis=0)

@@ -81,7 +81,7 @@ def sphere_directions(corners: Floats, sphere: Floats, points: Floats) -> Floats
 
 @kernel
 def texels_towards(directions: Floats, n: int) -> Ints:
-    """Flat indices [k] of the texels in which directions [k, 3] lie; see `cube_chart_points`.
+    """Flat indices [k] of the texels that contain directions [k, 3]; see `cube_chart_points`.
 
     A flat index is (chart N + row) N + column.
     """
@@ -226,7 +226,7 @@ class CubeChartMap:
         return cube_chart_points(coordinates, resolution)
 
     def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
-        """Flat indices [k] of the texels in which points [k, 3] [m] on triangles [k] lie."""
+        """Flat indices [k] of the texels that contain points [k, 3] [m] on triangles [k]."""
         return texels_towards(self.coordinates(mesh, triangles, points), resolution)
 
     def linear_parts(self, mesh: Mesh) -> Parts:

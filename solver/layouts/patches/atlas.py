@@ -75,7 +75,7 @@ class PatchChartMap:
         return chart.astype(np.int64), row * resolution - 0.5, column * resolution - 0.5
 
     def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
-        """Flat indices [k] of the texels in which points [k, 3] [m] on triangles [k] lie."""
+        """Flat indices [k] of the texels that contain points [k, 3] [m] on triangles [k]."""
         return _texels_on_pieces(
             mesh.V[mesh.F[triangles]], self._first, self.pieces, resolution, triangles, points
         )

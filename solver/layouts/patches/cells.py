@@ -167,7 +167,7 @@ class VoronoiCells:
 
 
 def spread_seeds(metric: Metric, reach: float) -> Ints:
-    """Vertices of which one lies within reach of every vertex, on one connected component.
+    """Vertices such that every vertex has one of them within reach, on one component.
 
     Each is the farthest from those before.
     """

@@ -214,7 +214,7 @@ def fans_of(sides: list[Sides], glued: Ints) -> tuple[Fans, list[int]]:
 def with_even_corners(
     surface: TriangleSurface, chart: Ints, sides: list[Sides]
 ) -> tuple[TriangleSurface, list[Sides]]:
-    """Move the corners in which three cells meet to the middle between the cells' middles.
+    """Move the corners where three cells meet to the middle between the cells' middles.
 
     Voronoi cells often have very short sides, along which texels would be tiny. So the three charts
     round a corner, a triangle between three cells' middles, are joined and cut anew as the cells

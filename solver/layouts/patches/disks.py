@@ -197,7 +197,7 @@ def along(V: Floats, paths: list[Ints]) -> Floats:
 
 
 def _solved(corners: Ints, weights: Floats, start: Floats) -> Floats:
-    """Places [n, 2] of all vertices; NaN in `start` is what is looked for."""
+    """Places [n, 2] of all vertices; places that are NaN in `start` are computed."""
     free = np.isnan(start[:, 0])
     row = np.repeat(corners, 2, axis=1).ravel()
     column = np.stack([np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)], axis=2).ravel()

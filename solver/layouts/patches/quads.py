@@ -466,7 +466,7 @@ def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
 
     Otherwise there are about as many small ones.
 
-    Raises `AtlasError` if round-off folds a triangle whatever the cells.
+    Raises `AtlasError` if round-off folds a triangle with every choice of cells.
     """
     quads = large_quads_of(part, count) if large else None
     if quads is not None:

@@ -138,7 +138,7 @@ def stars(F: Ints, count: int) -> tuple[Ints, Ints]:
 
 @kernel
 def frame_of(seamless: SeamlessMap, f: int, k: int) -> Frame:
-    """Change from the frame of corner k of triangle f to that of the triangle."""
+    """Change from the frame of corner k of triangle f to the frame of the triangle."""
     return seamless.turn[f, k], seamless.shift[f, k]
 
 

@@ -26,7 +26,7 @@ NEGLIGIBLE = 1e-2  # share of the narrowness that no rotation need look at
 
 @dataclass(frozen=True)
 class Certificate:
-    """What `certify` found.
+    """The result of `certify`.
 
     A map whose triangles all keep their orientation and together cover the sphere's 4 pi once is a
     bijection: a point covered twice would make the sum of solid angles larger.

@@ -149,7 +149,7 @@ def vertex_quadrics(tail: Ints32, V: Floats) -> Floats:
 
 
 class _Front(NamedTuple):
-    """The mesh while it collapses, and what is known of the next collapse of each vertex."""
+    """The mesh while it collapses, and the next collapse of each vertex as far as it is known."""
 
     table: CornerTable
     V: Floats  # [n, 3]
