@@ -1,19 +1,14 @@
-"""Queries of triangles: ray hits by Embree (in float32), and nearest points by libigl."""
+"""Queries of triangles: ray hits, see `rays`, and nearest points by libigl."""
 
 from __future__ import annotations
 
 import igl
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernel import Floats, Floats32, Ints
 from .points import check_points
-
-# Distances beyond this are misses, in lengths of a ray's direction: Embree's distance of a miss is
-# 1e37.
-_MISS_DISTANCE = 1e36
+from .rays import make_rays
 
 
 class ClosestPoints:
@@ -72,9 +67,10 @@ class RayScene:
     """
 
     def __init__(self, V: NDArray, F: NDArray | None = None) -> None:
-        self._scene = EmbreeScene()
-        indices = () if F is None else (np.ascontiguousarray(F, dtype=np.int32),)
-        TriangleMesh(self._scene, np.ascontiguousarray(V, dtype=np.float32), *indices)
+        if F is None:
+            V = V.reshape(-1, 3)
+            F = np.arange(len(V)).reshape(-1, 3)
+        self._rays = make_rays(V, F)
 
     def cast(
         self, origins: NDArray, directions: NDArray
@@ -90,19 +86,11 @@ class RayScene:
         u, v : float32 [k]
             Barycentric coordinates of the triangle's second and third corner.
         """
-        hits = self._scene.run(_float32(origins), _float32(directions), output=1)
-        triangle = np.asarray(hits["primID"], dtype=np.int64)
-        distance = np.where(triangle >= 0, hits["tfar"], np.float32(np.inf))
-        return triangle, distance, hits["u"], hits["v"]
+        return self._rays.cast(origins, directions)
 
     def distances(self, origins: NDArray, directions: NDArray) -> Floats32:
         """The distances of `cast` alone, in less time."""
-        distances = self._scene.run(_float32(origins), _float32(directions), query="DISTANCE")
-        return np.where(distances < _MISS_DISTANCE, distances, np.float32(np.inf))
-
-
-def _float32(vectors: NDArray) -> Floats32:
-    return np.ascontiguousarray(vectors, dtype=np.float32)
+        return self._rays.distances(origins, directions)
 
 
 def downward_hits(

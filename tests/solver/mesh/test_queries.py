@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.solver.mesh import ClosestPoints, RayScene, downward_hits
+from ripple_sim.solver.mesh import ClosestPoints, RayScene, downward_hits, rays
 
 
 def test_triangles_without_area_and_triangles_in_one_place() -> None:
@@ -56,3 +56,23 @@ def test_heights_follow_size_and_place_of_the_mesh(size: float, offset: list[flo
     assert hits(solid, [[size * (x + 0.1), size * (y - 0.2)]]) == pytest.approx(
         [size * (z + 0.5)], rel=1e-5
     )
+
+
+def test_rays_of_libigl_hit_what_those_of_embree_hit(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("embreex")
+    solid = trimesh.creation.annulus(0.4, 1.0, 0.5, sections=24)
+    V, F = np.array(solid.vertices), np.array(solid.faces)
+    random = np.random.default_rng(0)
+    origins = random.normal(size=(500, 3))
+    directions = 0.3 * random.normal(size=(500, 3)) - origins
+    by_embree = RayScene(V, F)
+    monkeypatch.setattr(rays, "EmbreeScene", None)  # as on Linux on ARM
+    by_libigl = RayScene(V[F])
+    expected = by_embree.cast(origins, directions)
+    is_hit = expected[0] >= 0
+    assert 100 < is_hit.sum() < 400
+    for value, expected_value in zip(by_libigl.cast(origins, directions), expected, strict=True):
+        assert value.dtype == expected_value.dtype
+        np.testing.assert_allclose(value[is_hit], expected_value[is_hit], atol=2e-4)
+    np.testing.assert_array_equal(by_libigl.cast(origins, directions)[0] >= 0, is_hit)
+    assert np.isinf(by_libigl.distances(origins, directions)[~is_hit]).all()
