@@ -47,7 +47,8 @@ from .overlays import (
     Request as Request,
     parse_request as parse_request,
 )
-from .paint import load_image as load_image, mesh_image as mesh_image, paint_target as paint_target
+from .paint import paint_target as paint_target
+from .pictures import load_image as load_image, picture_pixels as picture_pixels
 from .scene import (
     MAX_DURATION as MAX_DURATION,
     MAX_SLOW_MOTION as MAX_SLOW_MOTION,

@@ -135,7 +135,7 @@ def drop_scene(
     look : str
         Of the target.
     texture : path, optional
-        Image instead of the look's colour; for the default see `mesh_image`.
+        Image instead of the look's colour; for the default see `paint_target`.
     edit : callable, optional
         Changes the model's specification in place, before it is compiled.
     **reading : bool
@@ -166,7 +166,7 @@ def drop_scene(
     spec, drops = drop_model(V, mesh.F, body_shapes, rng, eye, scale)
     if not mesh.closed:
         make_collidable(spec, "target", "flex")
-    paint_target(spec, mesh, mesh_path, texture)
+    not_shown = paint_target(spec, mesh, mesh_path, texture)
     if edit is not None:
         edit(spec)
     with refusal_of(f"the mesh {str(mesh_path)!r}"):
@@ -178,7 +178,7 @@ def drop_scene(
         camera=camera,
         duration=DURATION,
         events=Events(drop=tuple(drops)),
-        notes=mesh.notes,
+        notes=(*mesh.notes, *not_shown),
     )
 
 

@@ -4,7 +4,6 @@ from .mesh import (
     check_genus_zero as check_genus_zero,
     vertex_normals as vertex_normals,
 )
-from .ply import Element as Element, read_binary as read_binary, read_text as read_text
 from .queries import (
     ClosestPoints as ClosestPoints,
     RayScene as RayScene,

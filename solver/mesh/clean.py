@@ -50,27 +50,27 @@ class Corners:
     given : int64 [triangle_count, 3]
         Vertices in the user's arrays; -1 at vertices that cleaning added. Where surfaces touch,
         they show which triangles were joined.
-    uv : float64 [triangle_count, 3, 2] or None
-        Texture coordinates.
+    data : float64 [triangle_count, 3, k]
+        What else the corners carry, linear in each triangle, such as texture coordinates.
+    source : int64 [triangle_count]
+        Triangle of the user's that each was, or was cut from.
     """
 
     F: NDArray[np.int64]
     given: NDArray[np.int64]
-    uv: NDArray[np.float64] | None
+    data: NDArray[np.float64]
+    source: NDArray[np.int64]
 
     def subset(self, chosen: NDArray) -> Corners:
         """Some of the triangles, chosen by a mask or by number."""
-        uv = None if self.uv is None else self.uv[chosen]
-        return Corners(self.F[chosen], self.given[chosen], uv)
+        return Corners(self.F[chosen], self.given[chosen], self.data[chosen], self.source[chosen])
 
     def reversed(self, chosen: NDArray[np.bool_]) -> Corners:
         """All triangles, the chosen ones wound the other way."""
         F = np.where(chosen[:, None], self.F[:, ::-1], self.F)
         given = np.where(chosen[:, None], self.given[:, ::-1], self.given)
-        uv = None
-        if self.uv is not None:
-            uv = np.where(chosen[:, None, None], self.uv[:, ::-1], self.uv)
-        return Corners(F, given, uv)
+        data = np.where(chosen[:, None, None], self.data[:, ::-1], self.data)
+        return Corners(F, given, data, self.source)
 
     def split(
         self, point: NDArray[np.int64], given: NDArray[np.int64], share: NDArray[np.float64]
@@ -99,11 +99,14 @@ class Corners:
         corner = np.concatenate(patterns)[order]
         F = np.hstack([self.F, point])
         numbers = np.hstack([self.given, given])
-        uv = None
-        if self.uv is not None:
-            along = self.uv + share[..., None] * (np.roll(self.uv, -1, axis=1) - self.uv)
-            uv = np.concatenate([self.uv, along], axis=1)[parent[:, None], corner]
-        return Corners(F[parent[:, None], corner], numbers[parent[:, None], corner], uv)
+        along = self.data + share[..., None] * (np.roll(self.data, -1, axis=1) - self.data)
+        data = np.concatenate([self.data, along], axis=1)
+        return Corners(
+            F[parent[:, None], corner],
+            numbers[parent[:, None], corner],
+            data[parent[:, None], corner],
+            self.source[parent],
+        )
 
 
 def counted(number: int, thing: str) -> str:

@@ -24,6 +24,7 @@ from .clean import (
     place,
     without_slivers,
 )
+from .looks import Looks
 from .sheets import cut_apart
 from .topology import (
     corner_angles,
@@ -127,6 +128,8 @@ class Mesh:
         What was done to it on reading, one line each.
     name : str
         Its name in messages.
+    looks : Looks or None
+        The materials and colours of its triangles, if the file has any.
     """
 
     V: NDArray[np.float64]
@@ -135,10 +138,16 @@ class Mesh:
     corner_uv: NDArray[np.float64] | None = None
     notes: tuple[str, ...] = ()
     name: str = "mesh"
+    looks: Looks | None = None
 
     @classmethod
     def from_arrays(
-        cls, V: ArrayLike, F: ArrayLike, uv: ArrayLike | None = None, name: str = "mesh"
+        cls,
+        V: ArrayLike,
+        F: ArrayLike,
+        uv: ArrayLike | None = None,
+        name: str = "mesh",
+        looks: Looks | None = None,
     ) -> Mesh:
         """Make a mesh of any triangle soup.
 
@@ -159,20 +168,29 @@ class Mesh:
             Texture coordinates of the vertices as given (before merging), or of every corner.
         name : str
             Its name in messages.
+        looks : Looks, optional
+            Materials and colours of the triangles as given.
 
         Raises
         ------
         MeshError
             If there is no triangle with an area, or a vertex is not finite.
         """
-        points, triangles, corner_uv = _checked(V, F, uv, name)
+        points, triangles, given_uv = _checked(V, F, uv, name)
+        given_colors = None if looks is None else looks.colors
+        data = _side_by_side(len(triangles), given_uv, given_colors)
         with np.errstate(under="ignore"):
-            points, corners, notes = _cleaned(points, triangles, corner_uv, name)
+            points, corners, notes = _cleaned(points, triangles, data, name)
+        corner_uv = None
         vertex_uv = None
-        if corners.uv is not None:
+        if given_uv is not None:
+            corner_uv = np.ascontiguousarray(corners.data[..., :2])
             vertex_uv = np.zeros((len(points), 2))
-            vertex_uv[corners.F[::-1].ravel()] = corners.uv[::-1].reshape(-1, 2)
-        return cls(points, corners.F, vertex_uv, corners.uv, notes, name)
+            vertex_uv[corners.F[::-1].ravel()] = corner_uv[::-1].reshape(-1, 2)
+        if looks is not None:
+            colors = None if given_colors is None else corners.data[..., -4:]
+            looks = looks.of_triangles(corners.source, colors)
+        return cls(points, corners.F, vertex_uv, corner_uv, notes, name, looks)
 
     @functools.cached_property
     def components(self) -> NDArray[np.int64]:
@@ -261,6 +279,13 @@ class Mesh:
         return vertex_normals(self.V, self.F)
 
 
+def _side_by_side(count: int, *data: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """Data of the corners of `count` triangles, [count, 3, k each], as one array; None is left out."""
+    return np.concatenate(
+        [np.empty((count, 3, 0)), *(each for each in data if each is not None)], 2
+    )
+
+
 def _checked(
     V: ArrayLike, F: ArrayLike, uv: ArrayLike | None, name: str
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]:
@@ -311,7 +336,7 @@ def _checked(
 
 
 def _cleaned(
-    V: NDArray[np.float64], F: NDArray[np.int64], uv: NDArray[np.float64] | None, name: str
+    V: NDArray[np.float64], F: NDArray[np.int64], data: NDArray[np.float64], name: str
 ) -> tuple[NDArray[np.float64], Corners, tuple[str, ...]]:
     """Make a triangle soup a manifold, oriented surface of triangles that have an area.
 
@@ -324,7 +349,7 @@ def _cleaned(
     merged, joined = merged_vertices(V, F)
     empty = collapsed(merged)
     keep = distinct_triangles(merged)
-    corners, slivers = without_slivers(V, Corners(merged, F, uv).subset(keep))
+    corners, slivers = without_slivers(V, Corners(merged, F, data, np.arange(len(F))).subset(keep))
     if len(corners.F) == 0:
         raise MeshError(
             f"{name} has no triangle with an area: none has three different corners that lie on no "
@@ -333,7 +358,7 @@ def _cleaned(
     first_given = distinct(corners.F)
     compact = np.searchsorted(first_given, corners.F)
     points, corners, cuts = cut_apart(
-        V[first_given], Corners(compact, corners.given, corners.uv), first_given
+        V[first_given], dataclasses.replace(corners, F=compact), first_given
     )
     merges, splits = _merges_and_splits(corners)
     turned, turns = oriented(points, corners)

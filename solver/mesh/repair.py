@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import MeshError
 from .clean import counted, place
+from .looks import Looks
 from .mesh import Mesh
 from .soup import Soup
 
@@ -71,14 +72,29 @@ def repaired(soup: Soup, name: str) -> Mesh:
     # from the numbers of the open parts to the numbers of the whole mesh
     lids = np.append(vertices, len(mesh.V) + np.arange(len(new_V)))[lids]
     V = np.vstack([mesh.V, new_V])
+    rim = np.concatenate(mesh.rims)
+    nearest = rim[cKDTree(V[rim]).query(V[lids])[1]]
     uv = mesh.corner_uv
     if uv is not None and mesh.uv is not None:
-        rim = np.concatenate(mesh.rims)
-        nearest = rim[cKDTree(V[rim]).query(V[lids])[1]]
         uv = np.concatenate([uv, mesh.uv[nearest]])
-    closed = Mesh.from_arrays(V, np.vstack([mesh.F, lids]), uv, mesh.name)
+    looks = _looks_of_lids(mesh, nearest)
+    closed = Mesh.from_arrays(V, np.vstack([mesh.F, lids]), uv, mesh.name, looks)
     notes = (*mesh.notes, *_hole_notes(mesh, closed), *closed.notes)
     return dataclasses.replace(closed, notes=notes)
+
+
+def _looks_of_lids(mesh: Mesh, nearest: NDArray[np.int64]) -> Looks | None:
+    """Looks of a mesh and of its lids, whose corners are nearest to vertices [k, 3] of the mesh."""
+    if mesh.looks is None:
+        return None
+    corner_of_vertex = np.zeros(len(mesh.V), dtype=np.int64)
+    corner_of_vertex[mesh.F.ravel()] = np.arange(mesh.F.size)
+    corner = corner_of_vertex[nearest]
+    colors = mesh.looks.colors
+    if colors is not None:
+        colors = np.concatenate([colors, colors.reshape(-1, 4)[corner]])
+    source = np.append(np.arange(len(mesh.F)), corner[:, 0] // 3)
+    return mesh.looks.of_triangles(source, colors)
 
 
 def _finite_mesh(soup: Soup, name: str) -> Mesh:
@@ -90,7 +106,11 @@ def _finite_mesh(soup: Soup, name: str) -> Mesh:
             f"infinite"
         )
     uv = None if soup.corner_uv is None else soup.corner_uv[finite]
-    mesh = Mesh.from_arrays(soup.V, soup.F[finite], uv, name)
+    looks = soup.looks
+    if looks is not None:
+        colors = None if looks.colors is None else looks.colors[finite]
+        looks = looks.of_triangles(np.flatnonzero(finite), colors)
+    mesh = Mesh.from_arrays(soup.V, soup.F[finite], uv, name, looks)
     if finite.all():
         return mesh
     dropped = (

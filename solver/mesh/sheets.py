@@ -6,6 +6,8 @@ this decides which sheet goes on in which other one.
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -262,7 +264,7 @@ def cut_apart(
     order = np.argsort(np.where(uncut, first_given[vertex], lowest_given), kind="stable")
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    cut = Corners(rank[fan].reshape(-1, 3), corners.given, corners.uv)
+    cut = dataclasses.replace(corners, F=rank[fan].reshape(-1, 3))
     V, cut = _without_double_edges(V[vertex[order]], cut, pairs)
     notes = []
     if len(crowded):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clean import counted
+from .looks import Looks
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,12 +27,15 @@ class Soup:
         Texture coordinates of the corners; 0 where the file has none for some of them.
     notes : tuple of str
         What was left out, one line each.
+    looks : Looks or None
+        The materials and colours of the triangles.
     """
 
     V: NDArray[np.float64]
     F: NDArray[np.int64]
     corner_uv: NDArray[np.float64] | None = None
     notes: tuple[str, ...] = ()
+    looks: Looks | None = None
 
 
 def too_small(sizes: NDArray[np.int64]) -> tuple[str, ...]:

@@ -12,13 +12,12 @@ from PIL import Image
 
 from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.coupling.target_mesh import target_mesh
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
 from ripple_sim.scene import (
     UP_AXES,
     Scene,
     check_scene,
     drop_scene,
-    mesh_image,
     paint_target,
     usual_up,
 )
@@ -144,35 +143,6 @@ def textured_obj(path: Path, head: str = "", before_faces: str = "") -> Path:
     lines += [before_faces, *("f " + " ".join(f"{i + 1}/{i + 1}" for i in face) for face in F)]
     path.write_text("\n".join(lines))
     return path
-
-
-def test_the_picture_is_named_by_the_material_library(tmp_path):
-    half_and_half(tmp_path / "coat of paint.png")
-    materials = (
-        "newmtl other\nmap_Kd slot_scratch.png\nnewmtl skin\nKd 1 1 1\nmap_Kd coat of paint.png\n"
-    )
-    (tmp_path / "p.mtl").write_text(materials)
-    picture = mesh_image(textured_obj(tmp_path / "p.obj", "mtllib p.mtl", "usemtl skin"))
-    assert (tuple(picture[0, 0]), tuple(picture[-1, 0])) == (RED, BLUE)
-
-
-def test_a_mesh_with_two_images_gets_none_and_warns(tmp_path):
-    half_and_half(tmp_path / "a.png")
-    half_and_half(tmp_path / "b.png")
-    (tmp_path / "p.mtl").write_text("newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png\n")
-    mesh = textured_obj(tmp_path / "p.obj", "mtllib p.mtl", "usemtl a\nusemtl b")
-    with pytest.warns(RippleWarning, match=r"2 images.*--texture"):
-        assert mesh_image(mesh) is None
-
-
-def test_the_image_of_a_glb_is_inside_it(tmp_path):
-    V, F = peanut()
-    material = trimesh.visual.material.PBRMaterial(
-        baseColorTexture=Image.open(half_and_half(tmp_path / "x.png"))
-    )
-    visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(V), 2)), material=material)
-    trimesh.Trimesh(V, F, visual=visual, process=False).export(tmp_path / "p.glb")
-    assert tuple(mesh_image(tmp_path / "p.glb")[0, 0]) == RED
 
 
 @pytest.mark.parametrize("how", ["named", "asked for", "p.ply", "p.glb", "p.obj"])

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 from PIL import Image
 
-from ripple_sim.scene import check_files, load_image, mesh_image
+from ripple_sim.scene import check_files, load_image, picture_pixels
 from ripple_sim.solver import (
     AtlasError,
     HeightMap,
@@ -29,6 +28,7 @@ from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.images import read_image
 from ripple_sim.solver.layouts import build_atlas
 from ripple_sim.solver.memory import require_memory, rooms
+from ripple_sim.solver.mesh.looks import Picture
 from ripple_sim.solver.texels import texture_map
 
 
@@ -203,22 +203,6 @@ def png(width: int, height: int) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join(packed)
 
 
-def glb(path: Path, image: bytes) -> Path:
-    """A ball whose image is replaced by another file of the same length."""
-    ball = trimesh.creation.icosphere(subdivisions=0)
-    small = path.with_name("small.png")
-    Image.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)).save(small)
-    with Image.open(small) as texture:
-        material = trimesh.visual.material.PBRMaterial(baseColorTexture=texture)
-        ball.visual = trimesh.visual.TextureVisuals(
-            uv=np.zeros((len(ball.vertices), 2)), material=material
-        )
-        content = ball.export(file_type="glb")
-    begin = content.index(b"\x89PNG")
-    path.write_bytes(content[:begin] + image + content[begin + len(image) :])
-    return path
-
-
 def with_coordinates() -> Any:
     atlas = sphere_atlas(resolution=4)
     object.__setattr__(atlas.mesh, "corner_uv", np.zeros((len(atlas.mesh.F), 3, 2)))
@@ -237,7 +221,8 @@ READERS: dict[str, Callable[[Path], object]] = {
     "texture of the command line": load_image,
     "map of a material": lambda path: texture_map(with_coordinates(), path, 0.0, 1.0),
     "texture of a model": lambda path: check_files(model(path)),
-    "image in a GLB": lambda path: mesh_image(glb(path.with_name("ball.glb"), path.read_bytes())),
+    "picture of a material": lambda path: picture_pixels(Picture(path, path.name)),
+    "picture in a GLB": lambda path: picture_pixels(Picture(path.read_bytes(), path.name)),
     "image of a look": lambda path: read_image(
         RippleError, path, "texture image", lambda mode: "RGB"
     ),

@@ -1,19 +1,22 @@
-"""PLY files as triangles, text or binary, with texture coordinates of vertices or of corners.
+"""PLY files as triangles, text or binary, with the names under which programs store their looks.
 
-trimesh reads PLY files too, but fails on binary ones that mix polygons of several sizes, which are
-common.
+Colours and texture coordinates may belong to vertices or to faces; MeshLab names pictures in
+comments.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MeshError
-from .soup import Soup, too_small, triangulate
+from ...errors import MeshError
+from ..looks import Looks, Paint, Picture, linear_light, unit_range, with_opacity
+from ..soup import Soup, too_small, triangulate
+from .mtl import found_file
 
 # NumPy's name of each number type of a PLY file.
 _TYPES = {
@@ -31,7 +34,24 @@ _TYPES = {
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 # Names under which programs store the texture coordinates of a vertex.
-_UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+_UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+
+# Names under which programs store a colour, and its opacity.
+_COLOR_NAMES = (
+    ("red", "green", "blue", "alpha"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
+    ("r", "g", "b", "a"),
+)
+
+# The comment with which MeshLab names a picture, in lower case.
+_PICTURE_COMMENT = "texturefile"
+
+# Names of the vertices of a face, and the property that chooses a picture.
+_CORNER_NAMES = ("vertex_indices", "vertex_index")
+_PICTURE_NUMBER = "texnumber"
+
+# What separates strips of triangles in their list of vertices.
+_STRIP_END = -1
 
 
 @dataclasses.dataclass
@@ -152,25 +172,28 @@ def _ends_early(element: Element) -> MeshError:
     return MeshError(f"it ends before the {element.rows} rows of its element {element.name}")
 
 
-def read_ply(content: bytes) -> Soup:
+def read_ply(path: Path) -> Soup:
     """Triangles of a PLY file.
 
     Raises `MeshError` if the file is not a PLY file, ends early, or refers to a vertex that does
     not exist.
     """
-    order, elements, data = _header(content)
+    order, elements, comments, data = _header(path.read_bytes())
     columns: dict[str, dict[str, Any]] = {}
     for element in elements:
         read = read_binary if order else read_text
         columns[element.name], data = read(element, data, order)
-        if "face" in columns and "vertex" in columns:
+        if "vertex" in columns and ("face" in columns or "tristrips" in columns):
             break
     vertex = columns.get("vertex", {})
     faces = columns.get("face", {})
     if any(name not in vertex for name in "xyz"):
         raise MeshError("it has no vertices with x, y and z")
-    V = np.stack([np.asarray(vertex[name], dtype=np.float64) for name in "xyz"], axis=1)
-    polygons = faces.get("vertex_indices", faces.get("vertex_index", []))
+    V = np.stack([np.asarray(_flat(vertex[name]), dtype=np.float64) for name in "xyz"], axis=1)
+    polygons = next((faces[name] for name in _CORNER_NAMES if name in faces), [])
+    if "tristrips" in columns:
+        polygons = _of_strips(columns["tristrips"])
+        faces = {}
     sizes = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
     corners = np.concatenate([np.empty(0), *polygons])
     if len(corners) and not (corners.min() >= 0 and corners.max() < len(V)):
@@ -181,7 +204,90 @@ def read_ply(content: bytes) -> Soup:
     index = corners.astype(np.int64)
     triangles = triangulate(V[index], sizes)
     uv = _corner_uv(vertex, faces, index, sizes)
-    return Soup(V, index[triangles], None if uv is None else uv[triangles], too_small(sizes))
+    F = index[triangles]
+    face = np.repeat(np.arange(len(sizes)), sizes)[triangles[:, 0]]
+    kinds = {
+        element.name: {name: kind for name, kind, _ in element.columns} for element in elements
+    }
+    colors = _corner_colors(vertex, faces, kinds, F, face)
+    looks = _looks(path, comments, faces, face, colors)
+    return Soup(V, F, None if uv is None else uv[triangles], too_small(sizes), looks)
+
+
+def _of_strips(columns: dict[str, Any]) -> list[NDArray[np.int64]]:
+    """Triangles of strips, as polygons; every second one is wound the other way."""
+    triangles: list[NDArray[np.int64]] = []
+    for row in next((columns[name] for name in _CORNER_NAMES if name in columns), []):
+        strip = np.asarray(row).astype(np.int64)
+        for part in np.split(strip, np.flatnonzero(strip == _STRIP_END)):
+            part = part[part != _STRIP_END]
+            F = np.stack([part[:-2], part[1:-1], part[2:]], axis=1)
+            F[1::2] = F[1::2, ::-1]
+            triangles.extend(F)
+    return triangles
+
+
+def _flat(column: Any) -> NDArray:
+    """A column of numbers, which may be stored as one list a row."""
+    return column if isinstance(column, np.ndarray) else np.concatenate([np.empty(0), *column])
+
+
+def _corner_colors(
+    vertex: dict[str, Any],
+    faces: dict[str, Any],
+    kinds: dict[str, dict[str, str]],
+    F: NDArray[np.int64],
+    face: NDArray[np.int64],
+) -> NDArray[np.float64] | None:
+    """Colours of the corners of triangles, [m, 3, 4]: of their faces, or else of the vertices.
+
+    Faces that are all alike say nothing beside coloured vertices.
+    """
+    of_faces = _colors(faces, kinds.get("face", {}))
+    of_vertices = _colors(vertex, kinds.get("vertex", {}))
+    if of_faces is not None and (of_vertices is None or np.ptp(of_faces, axis=0).any()):
+        return np.repeat(of_faces[face][:, None], 3, axis=1)
+    return None if of_vertices is None else of_vertices[F]
+
+
+def _colors(columns: dict[str, Any], kinds: dict[str, str]) -> NDArray[np.float64] | None:
+    """Linear light and opacity of the rows of an element, [n, 4]; None without colours."""
+    for names in _COLOR_NAMES:
+        if columns.keys() >= set(names[:3]) and len(columns[names[0]]):
+            channels = [
+                _flat(columns[name]).astype(kinds[name]) for name in names if name in columns
+            ]
+            return with_opacity(linear_light(unit_range(np.stack(channels, axis=1))))
+    return None
+
+
+def _looks(
+    path: Path,
+    comments: list[str],
+    faces: dict[str, Any],
+    face: NDArray[np.int64],
+    colors: NDArray[np.float64] | None,
+) -> Looks | None:
+    """Looks of triangles: the pictures that comments name, and colours."""
+    names = []
+    for comment in comments:
+        keyword, _, name = comment.partition(" ")
+        if keyword.lower() == _PICTURE_COMMENT and name.strip():
+            names.append(name.strip())
+    paints = tuple(
+        Paint(picture=Picture(found_file([path.parent], name) or path.parent / name, name))
+        for name in names
+    )
+    paint = np.zeros(len(face), dtype=np.int64)
+    if len(names) > 1 and _PICTURE_NUMBER in faces:
+        numbers = np.nan_to_num(np.asarray(_flat(faces[_PICTURE_NUMBER]), dtype=np.float64))
+        # a face without a picture has the number -1
+        paint = np.clip(numbers, -1, len(names) - 1).astype(np.int64)[face]
+        paints = (*paints, Paint())
+        paint = np.where(paint < 0, len(names), paint)
+    if colors is None and not paints:
+        return None
+    return Looks(paints or (Paint(),), paint, colors)
 
 
 def _corner_uv(
@@ -202,21 +308,26 @@ def _corner_uv(
         Corners of each polygon.
     """
     pairs = faces.get("texcoord")
-    if pairs is not None and all(
-        len(pair) == 2 * size for pair, size in zip(pairs, sizes, strict=True)
+    if (
+        pairs is not None
+        and len(pairs) == len(sizes)
+        and all(len(pair) == 2 * size for pair, size in zip(pairs, sizes, strict=True))
     ):
         return np.concatenate([np.empty(0), *pairs]).reshape(-1, 2)
     for names in _UV_NAMES:
         if vertex.keys() >= set(names):
-            uv_of_vertex = np.stack([vertex[name] for name in names], axis=1).astype(np.float64)
+            uv_of_vertex = np.stack([_flat(vertex[name]) for name in names], axis=1)
+            uv_of_vertex = uv_of_vertex.astype(np.float64)
             return uv_of_vertex[index]
     return None
 
 
-def _header(content: bytes) -> tuple[str, list[Element], bytes]:
-    """Byte order, elements, and the data behind the header."""
+def _header(content: bytes) -> tuple[str, list[Element], list[str], bytes]:
+    """Byte order, elements, comments, and the data behind the header."""
     head, end, data = content.partition(b"end_header")
-    lines = [line.split() for line in head.decode("ascii", errors="replace").splitlines()]
+    text = head.decode("utf-8", errors="replace").splitlines()
+    lines = [line.split() for line in text]
+    comments = [line[len("comment ") :].strip() for line in text if line.startswith("comment ")]
     if not end or not lines or lines[0] != ["ply"]:
         raise MeshError("it has no header from ply to end_header, as a PLY file does")
     order = None
@@ -238,4 +349,4 @@ def _header(content: bytes) -> tuple[str, list[Element], bytes]:
         ) from error
     if order is None or any(element.rows < 0 for element in elements):
         raise MeshError("its header gives no format or a negative number of rows")
-    return order, elements, data[2:] if data.startswith(b"\r\n") else data[1:]
+    return order, elements, comments, data[2:] if data.startswith(b"\r\n") else data[1:]

@@ -1,0 +1,412 @@
+"""One picture of many materials: the looks of a mesh, packed for renderers that take one texture.
+
+Each material gets a block of the packed picture. A block has a margin, where its picture goes on as
+its wrap mode says, so that filtered texels of a block never mix with another block.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
+from ripple_sim.solver.mesh.looks import CLAMP, MASK, MIRROR, REPEAT, Looks, Paint
+
+# Longest side of a packed picture [pixels]. It is longer where the colours of vertices need more.
+_LONGEST_SIDE = 4096
+
+# Pixels round a block, and the multiple of pixels at which it begins: three levels of mipmaps stay
+# apart.
+_MARGIN = 8
+
+# Side of the block of a plain colour [pixels], while there are few of them.
+_SWATCH = 8
+_SMALL_SWATCH = 2
+_MANY_SWATCHES = 16_384
+
+# Side of the square of a triangle whose colours change so much that they do not go on linearly.
+_STEEP_SQUARE = 8
+
+# Times that a picture may repeat along a side of a block. A triangle with more shows the mean.
+_MOST_REPEATS = 64
+
+# Largest and smallest side of the block of a triangle that has a picture and colours [pixels].
+_LARGEST_TRIANGLE = 256
+_SMALLEST_TRIANGLE = 4
+
+# Factor by which pictures shrink until they fit, and the least scale.
+_SHRINK = 0.85
+_LEAST_SCALE = 1 / 64
+
+
+class PackedPicture(NamedTuple):
+    """A picture and where triangles lie in it.
+
+    Attributes
+    ----------
+    pixels : uint8 [height, width, 4]
+        sRGB and opacity, top row first.
+    uv : float64 [triangle_count, 3, 2]
+        Texture coordinates of the corners; v is counted from the upper edge.
+    scale : float
+        By which the pictures were scaled to fit, 1 at most.
+    """
+
+    pixels: NDArray[np.uint8]
+    uv: NDArray[np.float64]
+    scale: float
+
+
+class _Block(NamedTuple):
+    """Pixels for some triangles, with a margin, and the corners' places in pixels from its corner.
+
+    Attributes
+    ----------
+    pixels : uint8 [height, width, 4]
+    triangles : int64 [k]
+    places : float64 [k, 3, 2]
+    """
+
+    pixels: NDArray[np.uint8]
+    triangles: NDArray[np.int64]
+    places: NDArray[np.float64]
+
+
+Decode = Callable[[Paint], NDArray[np.uint8] | None]
+
+
+def packed(looks: Looks, corner_uv: NDArray[np.float64] | None, decode: Decode) -> PackedPicture:
+    """Pack looks into one picture.
+
+    A mesh whose only picture repeats, without colours, keeps that picture and its coordinates.
+
+    Parameters
+    ----------
+    looks : Looks
+    corner_uv : [triangle_count, 3, 2] or None
+        Texture coordinates; v is counted from the lower edge.
+    decode : callable
+        Gives the picture of a material, [height, width, 4], sRGB and opacity, or None.
+    """
+    count = len(looks.paint)
+    uv = np.zeros((count, 3, 2)) if corner_uv is None else np.nan_to_num(corner_uv)
+    # v from the upper edge, and nothing that is too large for pixels
+    uv = np.clip(uv, -1e6, 1e6) * [1.0, -1.0] + [0.0, 1.0]
+    pictures = {number: decode(looks.paints[number]) for number in np.unique(looks.paint).tolist()}
+    colors = _varied_colors(looks)
+    if len(pictures) == 1 and colors is None:
+        (number, picture), *_ = pictures.items()
+        paint = looks.paints[number]
+        if picture is not None and paint.wrap == (REPEAT, REPEAT):
+            return PackedPicture(_tinted(picture, paint), uv, 1.0)
+    scale = 1.0
+    has_picture = any(picture is not None for picture in pictures.values())
+    while True:
+        blocks = _blocks(looks, uv, colors, pictures, scale)
+        can_shrink = has_picture and scale > _LEAST_SCALE
+        found = _laid_out(blocks, count, _LONGEST_SIDE if can_shrink else None, scale)
+        if found is not None:
+            return found
+        scale *= _SHRINK
+
+
+def _varied_colors(looks: Looks) -> NDArray[np.float64] | None:
+    """Colours of corners; None if all are white."""
+    if looks.colors is None or (looks.colors == 1).all():
+        return None
+    return looks.colors
+
+
+def _blocks(
+    looks: Looks,
+    uv: NDArray[np.float64],
+    colors: NDArray[np.float64] | None,
+    pictures: dict[int, NDArray[np.uint8] | None],
+    scale: float,
+) -> list[_Block]:
+    """Blocks that hold all triangles: of pictures, of pictures times colours, of plain colours."""
+    blocks = []
+    plain = np.zeros(len(uv), dtype=bool)
+    # linear light and opacity of triangles that are plain, at their corners
+    shades = np.ones((len(uv), 3, 4))
+    for number, picture in pictures.items():
+        paint = looks.paints[number]
+        triangles = np.flatnonzero(looks.paint == number)
+        if picture is None:
+            plain[triangles] = True
+            shades[triangles] = _factor(paint)
+            continue
+        local = _near_origin(uv[triangles], paint.wrap)
+        endless = np.ptp(local, axis=1).max(axis=1) > _MOST_REPEATS
+        plain[triangles[endless]] = True
+        shades[triangles[endless]] = _mean(picture) * _factor(paint)
+        rest = triangles[~endless]
+        if not len(rest):
+            continue
+        smaller = _scaled(picture, scale)
+        if colors is None:
+            blocks.append(_picture_block(smaller, paint, rest, local[~endless]))
+        else:
+            blocks += _triangle_blocks(smaller, paint, rest, local[~endless], colors[rest])
+    if plain.any():
+        triangles = np.flatnonzero(plain)
+        given = shades[triangles] if colors is None else shades[triangles] * colors[triangles]
+        blocks += _plain_blocks(triangles, given, looks)
+    return blocks
+
+
+def _factor(paint: Paint) -> NDArray[np.float64]:
+    """Linear light and opacity by which a material multiplies."""
+    return np.clip(np.nan_to_num(np.array(paint.color)), 0.0, 1.0)
+
+
+def _mean(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Mean of a picture, linear light and opacity."""
+    return _linear(picture).mean(axis=(0, 1))
+
+
+def _near_origin(uv: NDArray[np.float64], wrap: tuple[str, str]) -> NDArray[np.float64]:
+    """Coordinates moved by whole pictures, so that each triangle's middle is in the first one."""
+    moved = uv.copy()
+    for axis, mode in enumerate(wrap):
+        middle = uv[..., axis].mean(axis=1, keepdims=True)
+        if mode == REPEAT:
+            moved[..., axis] -= np.floor(middle)
+        elif mode == MIRROR:
+            moved[..., axis] -= 2 * np.floor(middle / 2)
+        else:
+            # beyond its edge a clamped picture is the same everywhere
+            moved[..., axis] = np.clip(uv[..., axis], -_MOST_REPEATS / 2, _MOST_REPEATS / 2)
+    return moved
+
+
+def _scaled(picture: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
+    height, width = picture.shape[:2]
+    size = max(1, round(scale * width)), max(1, round(scale * height))
+    if size == (width, height):
+        return picture
+    return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.BOX))
+
+
+def _picture_block(
+    picture: NDArray[np.uint8],
+    paint: Paint,
+    triangles: NDArray[np.int64],
+    uv: NDArray[np.float64],
+) -> _Block:
+    """The part of a picture that triangles show, with what lies beyond its edges."""
+    height, width = picture.shape[:2]
+    places = uv * [width, height]
+    low = np.floor(places.min(axis=(0, 1))).astype(np.int64) - _MARGIN
+    high = np.ceil(places.max(axis=(0, 1))).astype(np.int64) + _MARGIN
+    columns = _wrapped(np.arange(low[0], high[0]), width, paint.wrap[0])
+    rows = _wrapped(np.arange(low[1], high[1]), height, paint.wrap[1])
+    return _Block(_tinted(picture, paint)[np.ix_(rows, columns)], triangles, places - low)
+
+
+def _wrapped(index: NDArray[np.int64], size: int, mode: str) -> NDArray[np.int64]:
+    """Pixels of a picture that are seen at places within it and beyond."""
+    if mode == CLAMP:
+        return np.clip(index, 0, size - 1)
+    if mode == MIRROR:
+        place = index % (2 * size)
+        return np.minimum(place, 2 * size - 1 - place)
+    return index % size
+
+
+def _triangle_blocks(
+    picture: NDArray[np.uint8],
+    paint: Paint,
+    triangles: NDArray[np.int64],
+    uv: NDArray[np.float64],
+    colors: NDArray[np.float64],
+) -> list[_Block]:
+    """Blocks of triangles, each with a square of its own: the picture times the corners' colours.
+
+    The squares' sides are powers of two, about as many pixels as the picture has there.
+    """
+    height, width = picture.shape[:2]
+    places = uv * [width, height]
+    sides = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2).max(axis=1)
+    levels = np.ceil(np.log2(np.clip(sides, _SMALLEST_TRIANGLE, _LARGEST_TRIANGLE))).astype(int)
+    blocks = []
+    for level in np.unique(levels):
+        chosen = levels == level
+        side = 2**level
+        weights = _square_weights(side)
+        # half a square's pixels lie beyond the triangle, and go on linearly
+        at = np.einsum("rck,mkx->mrcx", weights, places[chosen])
+        tint = np.clip(np.einsum("rck,mkx->mrcx", weights, colors[chosen]), 0.0, 1.0)
+        values = _sampled(_linear(picture), at, paint.wrap) * _factor(paint) * tint
+        blocks.append(_grid(_encoded(values, paint), triangles[chosen]))
+    return blocks
+
+
+def _sampled(
+    picture: NDArray[np.float64], at: NDArray[np.float64], wrap: tuple[str, str]
+) -> NDArray[np.float64]:
+    """Linear interpolation between the pixels of a picture at places [..., 2]."""
+    height, width = picture.shape[:2]
+    low = np.floor(at - 0.5)
+    share = at - 0.5 - low
+    column, row = np.moveaxis(low.astype(np.int64), -1, 0)
+    columns = [_wrapped(column + k, width, wrap[0]) for k in (0, 1)]
+    rows = [_wrapped(row + k, height, wrap[1]) for k in (0, 1)]
+    across, down = np.moveaxis(share, -1, 0)[..., None]
+    upper = picture[rows[0], columns[0]] * (1 - across) + picture[rows[0], columns[1]] * across
+    lower = picture[rows[1], columns[0]] * (1 - across) + picture[rows[1], columns[1]] * across
+    return upper * (1 - down) + lower * down
+
+
+def _plain_blocks(
+    triangles: NDArray[np.int64], shades: NDArray[np.float64], looks: Looks
+) -> list[_Block]:
+    """Blocks of triangles without a picture: squares of one colour, or of the corners' colours.
+
+    `shades` [k, 3, 4] are linear light and opacity of the corners.
+    """
+    values = _encoded_by_paint(shades, looks, triangles)
+    even = (values == values[:, :1]).all(axis=(1, 2))
+    blocks = []
+    if even.any():
+        swatches, number = np.unique(values[even, 0], axis=0, return_inverse=True)
+        side = _SWATCH if len(swatches) < _MANY_SWATCHES else _SMALL_SWATCH
+        squares = np.broadcast_to(swatches[:, None, None], (len(swatches), side, side, 4))
+        grid = _grid(squares, np.arange(len(swatches)))
+        # the middle of the square: one place for all corners
+        middle = grid.places[:, :1] + 0.5 * (side - 1)
+        places = np.repeat(middle[number.ravel()], 3, axis=1)
+        blocks.append(_Block(grid.pixels, triangles[even], places))
+    uneven = np.flatnonzero(~even)
+    # beyond the triangle its colours go on linearly, as far as there are such colours
+    a, b, c = np.moveaxis(shades[uneven], 1, 0)
+    beyond = b + c - a
+    is_steep = ((beyond < 0) | (beyond > 1)).any(axis=1) & (len(uneven) < _MANY_SWATCHES)
+    for side, chosen in ((2, uneven[~is_steep]), (_STEEP_SQUARE, uneven[is_steep])):
+        if len(chosen):
+            blended = np.einsum("rck,mkx->mrcx", _square_weights(side), shades[chosen])
+            flat = np.clip(blended, 0.0, 1.0).reshape(len(chosen), -1, 4)
+            pixels = _encoded_by_paint(flat, looks, triangles[chosen])
+            blocks.append(_grid(pixels.reshape(-1, side, side, 4), triangles[chosen]))
+    return blocks
+
+
+def _square_weights(side: int) -> NDArray[np.float64]:
+    """Barycentric coordinates of the pixels of a square, of which a triangle covers one half.
+
+    Its corners are the middles of the pixels at the upper left, the upper right and the lower left.
+    """
+    s, t = np.meshgrid(*(np.linspace(0, 1, side),) * 2)
+    return np.stack([1 - s - t, s, t], axis=-1)
+
+
+def _grid(squares: NDArray[np.uint8], triangles: NDArray[np.int64]) -> _Block:
+    """A block of squares [k, side, side, 4], each of a triangle, as `_square_weights` says."""
+    count, side = squares.shape[:2]
+    across = math.ceil(math.sqrt(count))
+    down = math.ceil(count / across)
+    grid = np.zeros((down * across, side, side, 4), np.uint8)
+    grid[:count] = squares
+    pixels = grid.reshape(down, across, side, side, 4).swapaxes(1, 2)
+    row, column = np.divmod(np.arange(count), across)
+    first = np.stack([column, row], axis=1)[:, None] * side + 0.5
+    places = first + np.array([[0, 0], [side - 1, 0], [0, side - 1]])
+    return _Block(pixels.reshape(down * side, across * side, 4), triangles, places)
+
+
+def _tinted(picture: NDArray[np.uint8], paint: Paint) -> NDArray[np.uint8]:
+    """A picture times the colour of a material."""
+    factor = _factor(paint)
+    pixels = picture.copy()
+    pixels[..., 3] = _opacity(picture[..., 3] / 255 * factor[3], paint)
+    if (factor[:3] == 1).all():
+        return pixels
+    # each channel has 256 values: a table is exact and fast
+    table = _encode(srgb_to_linear(np.arange(256) / 255)[:, None] * factor[:3])
+    for channel in range(3):
+        pixels[..., channel] = table[:, channel][picture[..., channel]]
+    return pixels
+
+
+def _linear(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Linear light and opacity of pixels."""
+    linear = picture / 255
+    linear[..., :3] = srgb_to_linear(linear[..., :3])
+    return linear
+
+
+def _encode(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
+    return np.rint(255 * linear_to_srgb(np.clip(linear, 0.0, 1.0))).astype(np.uint8)
+
+
+def _encoded(values: NDArray[np.float64], paint: Paint) -> NDArray[np.uint8]:
+    """Pixels of linear light and opacity [..., 4]."""
+    pixels = np.empty(values.shape, np.uint8)
+    pixels[..., :3] = _encode(values[..., :3])
+    pixels[..., 3] = _opacity(values[..., 3], paint)
+    return pixels
+
+
+def _encoded_by_paint(
+    values: NDArray[np.float64], looks: Looks, triangles: NDArray[np.int64]
+) -> NDArray[np.uint8]:
+    """Pixels of linear light and opacity [k, n, 4] of triangles with their materials."""
+    pixels = np.empty(values.shape, np.uint8)
+    pixels[..., :3] = _encode(values[..., :3])
+    paint_of = looks.paint[triangles]
+    for number in np.unique(paint_of):
+        chosen = paint_of == number
+        pixels[chosen, ..., 3] = _opacity(values[chosen, ..., 3], looks.paints[number])
+    return pixels
+
+
+def _opacity(opacity: NDArray[np.float64], paint: Paint) -> NDArray[np.uint8]:
+    """Opacity as pixels: a mask is whole or not, and other materials are opaque."""
+    if paint.alpha == MASK:
+        return np.where(opacity >= paint.cutoff, 255, 0).astype(np.uint8)
+    return np.full(np.shape(opacity), 255, np.uint8)
+
+
+def _laid_out(
+    blocks: list[_Block], count: int, longest: int | None, scale: float
+) -> PackedPicture | None:
+    """Blocks on shelves, the highest first; None if a side would be too long."""
+    order = sorted(range(len(blocks)), key=lambda i: (-blocks[i].pixels.shape[0], i))
+    area = sum(block.pixels.shape[0] * block.pixels.shape[1] for block in blocks)
+    widest = max(block.pixels.shape[1] for block in blocks)
+    width = max(_aligned(widest), _aligned(math.ceil(math.sqrt(area))))
+    if longest is not None:
+        width = min(width, longest)
+    corners = {}
+    x = y = shelf = 0
+    for i in order:
+        height, block_width = blocks[i].pixels.shape[:2]
+        if x and x + block_width > width:
+            x = 0
+            y += shelf
+            shelf = 0
+        corners[i] = x, y
+        x = _aligned(x + block_width)
+        shelf = max(shelf, _aligned(height))
+    height = y + shelf
+    if longest is not None and max(widest, height) > longest:
+        return None
+    pixels = np.zeros((height, width, 4), np.uint8)
+    pixels[..., 3] = 255
+    uv = np.zeros((count, 3, 2))
+    for i, (left, top) in corners.items():
+        block = blocks[i]
+        rows, columns = block.pixels.shape[:2]
+        pixels[top : top + rows, left : left + columns] = block.pixels
+        places = block.places + np.array([left, top])
+        uv[block.triangles] = places / [width, height]
+    return PackedPicture(pixels, uv, scale)
+
+
+def _aligned(length: int) -> int:
+    return -(-length // _MARGIN) * _MARGIN

@@ -1,0 +1,230 @@
+"""The looks of a mesh file, packed into one texture of the model."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from gltf_files import SQUARE, SQUARE_UV, Gltf, png
+from PIL import Image
+
+from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
+from ripple_sim.scene import drop_scene
+from ripple_sim.scene.packing import packed
+from ripple_sim.scene.paint import paint_target
+from ripple_sim.scene.pictures import Pictures, load_image
+from ripple_sim.solver import Mesh, load_mesh
+from ripple_sim.solver.mesh.looks import CLAMP, MIRROR, REPEAT, Looks, Paint, Picture
+
+RED = (255, 0, 0)
+BLUE = (0, 0, 255)
+RNG = np.random.default_rng(0)
+PIXELS = RNG.integers(0, 256, (4, 6, 3), dtype=np.uint8)
+PICTURE = Picture(png(PIXELS), "picture")
+# two triangles of a square, with texture coordinates
+UV = SQUARE_UV[[[0, 1, 2], [0, 2, 3]]] * [1, -1] + [0, 1]
+
+
+def bilinear(pixels: np.ndarray, place: np.ndarray, index) -> np.ndarray:
+    """Linear light between the middles of pixels at a place [pixels]; `index` wraps numbers."""
+    low = np.floor(place - 0.5).astype(int)
+    share = place - 0.5 - low
+    total = np.zeros(3)
+    for right in (0, 1):
+        for down in (0, 1):
+            weight = (share[0] if right else 1 - share[0]) * (share[1] if down else 1 - share[1])
+            row = index(low[1] + down, pixels.shape[0])
+            column = index(low[0] + right, pixels.shape[1])
+            total += weight * srgb_to_linear(pixels[row, column, :3] / 255)
+    return total
+
+
+WRAPS = {
+    REPEAT: lambda i, n: i % n,
+    CLAMP: lambda i, n: min(max(i, 0), n - 1),
+    MIRROR: lambda i, n: i % n if (i // n) % 2 == 0 else n - 1 - i % n,
+}
+
+
+def seen(picture, triangle: int, weights: np.ndarray) -> np.ndarray:
+    """Linear light that a renderer shows at a point of a triangle."""
+    place = weights @ picture.uv[triangle] * picture.pixels.shape[1::-1]
+    return bilinear(picture.pixels, place, WRAPS[REPEAT])
+
+
+def points(count: int = 20) -> np.ndarray:
+    return np.random.default_rng(1).dirichlet((1, 1, 1), count)
+
+
+@pytest.mark.parametrize("wrap", WRAPS)
+@pytest.mark.parametrize("shift", [0.0, 0.3, -2.7])
+@pytest.mark.parametrize("scale", [1.0, 2.5])
+def test_a_packed_picture_shows_what_the_sampler_shows(wrap: str, shift: float, scale) -> None:
+    """Another material beside it keeps the picture from staying as it is."""
+    paints = (Paint((0.5, 1, 1, 1), PICTURE, wrap=(wrap, wrap)), Paint((0, 0, 1, 1)))
+    uv = np.concatenate([scale * UV + shift, UV])
+    picture = packed(Looks(paints, np.array([0, 0, 1, 1])), uv, Pictures().of)
+    for triangle in range(2):
+        for weights in points():
+            u, v = weights @ uv[triangle]
+            truth = bilinear(PIXELS, np.array([6 * u, 4 * (1 - v)]), WRAPS[wrap]) * [0.5, 1, 1]
+            np.testing.assert_allclose(seen(picture, triangle, weights), truth, atol=0.01)
+    for weights in points(5):
+        np.testing.assert_allclose(seen(picture, 2, weights), [0, 0, 1], atol=1e-9)
+
+
+def test_a_single_picture_that_repeats_stays_bit_for_bit() -> None:
+    looks = Looks((Paint(picture=PICTURE),), np.zeros(2, np.int64), np.ones((2, 3, 4)))
+    picture = packed(looks, 3 * UV, Pictures().of)
+    np.testing.assert_array_equal(picture.pixels[..., :3], PIXELS)
+    np.testing.assert_array_equal(picture.uv, 3 * UV * [1, -1] + [0, 1])
+
+
+def test_colours_of_corners_are_linear_and_sharp_at_borders() -> None:
+    colors = np.ones((3, 3, 4))
+    colors[..., :3] = np.random.default_rng(2).random((3, 3, 3))
+    colors[2, :, :3] = [[1, 1, 0], [0, 0, 0], [0, 0, 1]]
+    picture = packed(Looks((Paint((1, 0.5, 1, 1)),), np.zeros(3, int), colors), None, Pictures().of)
+    for triangle in range(3):
+        for weights in points():
+            truth = weights @ colors[triangle, :, :3] * [1, 0.5, 1]
+            np.testing.assert_allclose(seen(picture, triangle, weights), truth, atol=0.04)
+
+
+def test_a_picture_times_the_colours_of_corners() -> None:
+    smooth = Image.fromarray(PIXELS).resize((64, 64), Image.Resampling.BICUBIC)
+    colors = np.random.default_rng(2).random((2, 3, 4))
+    looks = Looks((Paint(picture=Picture(png(smooth), "p")),), np.zeros(2, int), colors)
+    picture = packed(looks, UV, Pictures().of)
+    for triangle in range(2):
+        for weights in points():
+            place = weights @ (UV[triangle] * [64, -64] + [0, 64])
+            truth = bilinear(np.asarray(smooth), place, WRAPS[REPEAT])
+            truth = truth * (weights @ colors[triangle, :, :3])
+            np.testing.assert_allclose(seen(picture, triangle, weights), truth, atol=0.03)
+
+
+def test_pictures_that_do_not_fit_are_scaled_and_endless_ones_are_their_mean() -> None:
+    large = Picture(png(np.repeat(np.uint8([[RED, BLUE]]), 1024, axis=1).repeat(2048, 0)), "large")
+    paints = (Paint(picture=large), Paint((0.5, 1, 1, 1), picture=large), Paint(picture=PICTURE))
+    uv = np.concatenate([3 * UV, 2 * UV, 1000 * UV])
+    looks = Looks(paints, np.repeat([0, 1, 2], 2))
+    picture = packed(looks, uv, Pictures().of)
+    assert picture.scale < 1 and max(picture.pixels.shape) <= 4096
+    mean = srgb_to_linear(PIXELS / 255).mean(axis=(0, 1))
+    np.testing.assert_allclose(seen(picture, 4, points(1)[0]), mean, atol=0.01)
+    for weights in points():
+        u = (weights @ uv[0])[0] % 1
+        if 0.01 < u % 0.5 < 0.49:
+            truth = [1, 0, 0] if u < 0.5 else [0, 0, 1]
+            np.testing.assert_allclose(seen(picture, 0, weights), truth, atol=1e-6)
+
+
+def test_a_mask_is_whole_or_open_and_its_texture_has_opacity(tmp_path: Path) -> None:
+    pixels = np.full((2, 2, 4), 255, np.uint8)
+    pixels[0, :, 3] = 100
+    file = Gltf()
+    material = file.add(
+        "materials",
+        alphaMode="MASK",
+        alphaCutoff=0.4,
+        pbrMetallicRoughness={"baseColorTexture": {"index": file.texture(pixels)}},
+    )
+    file.show(file.primitive(TEXCOORD_0=file.accessor(SQUARE_UV), material=material))
+    model, notes = painted(load_mesh(file.write(tmp_path / "a.glb")))
+    assert (model.tex_nchannel[0], notes) == (4, ())
+    assert sorted(set(model.tex_data[3::4].tolist())) == [0, 255]
+
+
+def painted(mesh: Mesh, texture=None) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    spec = mujoco.MjSpec()
+    # MuJoCo takes no mesh that is flat
+    V = mesh.V + mesh.V[:, :1] * mesh.V[:, 1:2] * [0, 0, 1]
+    asset = spec.add_mesh(name="target", uservert=V.ravel(), userface=mesh.F.ravel())
+    asset.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    spec.worldbody.add_geom(name="target", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="target")
+    notes = paint_target(spec, mesh, "mesh.glb", texture)
+    return spec.compile(), notes
+
+
+def test_half_transparent_materials_are_told_of_and_gloss_is_the_mean(tmp_path: Path) -> None:
+    file = Gltf()
+    gloss = file.texture([[[0, 128, 255]]])
+    first = file.add(
+        "materials",
+        alphaMode="BLEND",
+        pbrMetallicRoughness={
+            "baseColorFactor": [1, 0, 0, 0.2],
+            "metallicRoughnessTexture": {"index": gloss},
+        },
+    )
+    second = file.add("materials", pbrMetallicRoughness={"metallicFactor": 0})
+    file.show(file.primitive(material=first), file.primitive(3 * SQUARE + 1, material=second))
+    model, notes = painted(load_mesh(file.write(tmp_path / "a.glb")))
+    assert notes == ("1 half-transparent material is drawn opaque, or with holes",)
+    assert model.tex_nchannel[0] == 3
+    assert model.mat_metallic[0] == pytest.approx(0.1)
+    assert model.mat_roughness[0] == pytest.approx((128 / 255 + 9) / 10)
+
+
+def test_lost_pictures_are_told_of_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "damaged.png").write_bytes(b"no picture")
+    file = Gltf()
+    sources = [
+        {"uri": "damaged.png"},
+        {"uri": "gone.png"},
+        {"bufferView": file.view(b"\xabKTX 20\xbb\r\n\x1a\n"), "name": "compressed"},
+    ]
+    primitives = []
+    for number, source in enumerate(sources):
+        texture = file.add("textures", source=file.add("images", **source))
+        look = {"baseColorTexture": {"index": texture}, "baseColorFactor": [0, 1, 0, 1]}
+        material = file.add("materials", pbrMetallicRoughness=look)
+        primitives.append(file.primitive(SQUARE + 2 * number, material=material))
+    file.show(*primitives)
+    model, notes = painted(load_mesh(file.write(tmp_path / "a.glb")))
+    assert len(notes) == 1
+    assert notes[0].startswith(
+        "3 of 3 pictures are not shown: picture 'damaged.png' cannot be read: it is damaged"
+    )
+    assert "'gone.png' is missing, 'compressed' is KTX2" in notes[0]
+    assert (model.tex_data.reshape(-1, 3)[0] == [0, 255, 0]).all()
+
+
+@pytest.mark.parametrize("mode", ["I;16", "F", "LA", "P", "1", "CMYK"])
+@pytest.mark.parametrize("kind", ["png", "tif"])
+def test_pictures_of_every_depth_become_bytes(tmp_path: Path, mode: str, kind: str) -> None:
+    grey = np.array([[0, 64], [128, 255]], np.uint8)
+    if mode == "I;16":
+        image = Image.fromarray(grey.astype(np.uint16) * 257)
+    elif mode == "F":
+        image = Image.fromarray((grey / 255).astype(np.float32))
+    else:
+        image = Image.fromarray(grey).convert(mode)
+    if (kind, mode) in (("png", "F"), ("png", "CMYK")):
+        pytest.skip("PNG has no such pixels")
+    image.save(tmp_path / f"a.{kind}")
+    expected = grey if mode != "1" else np.where(np.asarray(image), 255, 0)
+    found = load_image(tmp_path / f"a.{kind}")
+    np.testing.assert_allclose(found, np.repeat(expected[..., None], 3, axis=2), atol=1)
+
+
+def test_floats_beyond_one_are_scaled_to_their_range(tmp_path: Path) -> None:
+    Image.fromarray(np.array([[-1.0, 1.0, 3.0]], np.float32)).save(tmp_path / "a.tif")
+    assert load_image(tmp_path / "a.tif")[0, :, 0].tolist() == [0, 128, 255]
+
+
+def test_drop_keeps_every_material_in_the_model_that_mujoco_draws(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 0 1\n")
+    text = (
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl a\nf 1 3 2\nf 1 2 4\nusemtl b\n"
+    )
+    (tmp_path / "a.obj").write_text(text + "f 2 3 4\nf 1 4 3\n")
+    model = drop_scene(tmp_path / "a.obj", bodies=0).model
+    height, width = int(model.tex_height[0]), int(model.tex_width[0])
+    pixels = model.tex_data.reshape(height, width, 3)
+    uv = model.mesh_texcoord[model.mesh_facetexcoord].mean(axis=1)
+    found = [tuple(pixels[int(v * height), int(u * width)].tolist()) for u, v in uv]
+    assert sorted(found) == [BLUE, BLUE, RED, RED]
+    srgb = linear_to_srgb(srgb_to_linear(np.array(RED) / 255))
+    np.testing.assert_allclose(255 * srgb, RED)
