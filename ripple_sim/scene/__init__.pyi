@@ -41,6 +41,7 @@ from .material_entry import (
     MaterialEntry as MaterialEntry,
     PresetEntry as PresetEntry,
 )
+from .material_images import image_pixels as image_pixels, load_image as load_image
 from .overlays import (
     HEATMAPS as HEATMAPS,
     NAMES as NAMES,
@@ -48,7 +49,6 @@ from .overlays import (
     parse_request as parse_request,
 )
 from .paint import paint_target as paint_target
-from .pictures import load_image as load_image, picture_pixels as picture_pixels
 from .scene import (
     MAX_DURATION as MAX_DURATION,
     MAX_SLOW_MOTION as MAX_SLOW_MOTION,

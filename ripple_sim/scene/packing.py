@@ -1,6 +1,6 @@
-"""One picture of many materials: the looks of a mesh, packed for renderers that take one texture.
+"""One image of many materials: the looks of a mesh, packed for renderers that take one texture.
 
-Each material gets a block of the packed picture. A block has a margin, where its picture goes on as
+Each material gets a block of the packed image. A block has a margin, where its image goes on as
 its wrap mode says, so that filtered texels of a block never mix with another block.
 """
 
@@ -17,7 +17,7 @@ from PIL import Image
 from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
 from ripple_sim.solver.mesh.looks import CLAMP, MASK, MIRROR, REPEAT, Looks, Paint
 
-# Longest side of a packed picture [pixels]. It is longer where the colours of vertices need more.
+# Longest side of a packed image [pixels]. It is longer where the colours of vertices need more.
 _LONGEST_SIDE = 4096
 
 # Pixels round a block, and the multiple of pixels at which it begins: three levels of mipmaps stay
@@ -32,20 +32,20 @@ _MANY_SWATCHES = 16_384
 # Side of the square of a triangle whose colours change so much that they do not go on linearly.
 _STEEP_SQUARE = 8
 
-# Times that a picture may repeat along a side of a block. A triangle with more shows the mean.
+# Times that an image may repeat along a side of a block. A triangle with more shows the mean.
 _MOST_REPEATS = 64
 
-# Largest and smallest side of the block of a triangle that has a picture and colours [pixels].
+# Largest and smallest side of the block of a triangle that has an image and colours [pixels].
 _LARGEST_TRIANGLE = 256
 _SMALLEST_TRIANGLE = 4
 
-# Factor by which pictures shrink until they fit, and the least scale.
+# Factor by which images shrink until they fit, and the least scale.
 _SHRINK = 0.85
 _LEAST_SCALE = 1 / 64
 
 
-class PackedPicture(NamedTuple):
-    """A picture and where triangles lie in it.
+class PackedImage(NamedTuple):
+    """A image and where triangles lie in it.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class PackedPicture(NamedTuple):
     uv : float64 [triangle_count, 3, 2]
         Texture coordinates of the corners; v is counted from the upper edge.
     scale : float
-        By which the pictures were scaled to fit, 1 at most.
+        By which the images were scaled to fit, 1 at most.
     """
 
     pixels: NDArray[np.uint8]
@@ -80,10 +80,10 @@ class _Block(NamedTuple):
 Decode = Callable[[Paint], NDArray[np.uint8] | None]
 
 
-def packed(looks: Looks, corner_uv: NDArray[np.float64] | None, decode: Decode) -> PackedPicture:
-    """Pack looks into one picture.
+def packed(looks: Looks, corner_uv: NDArray[np.float64] | None, decode: Decode) -> PackedImage:
+    """Pack looks into one image.
 
-    A mesh whose only picture repeats, without colours, keeps that picture and its coordinates.
+    A mesh whose only image repeats, without colours, keeps that image and its coordinates.
 
     Parameters
     ----------
@@ -91,24 +91,24 @@ def packed(looks: Looks, corner_uv: NDArray[np.float64] | None, decode: Decode) 
     corner_uv : [triangle_count, 3, 2] or None
         Texture coordinates; v is counted from the lower edge.
     decode : callable
-        Gives the picture of a material, [height, width, 4], sRGB and opacity, or None.
+        Gives the image of a material, [height, width, 4], sRGB and opacity, or None.
     """
     count = len(looks.paint)
     uv = np.zeros((count, 3, 2)) if corner_uv is None else np.nan_to_num(corner_uv)
     # v from the upper edge, and nothing that is too large for pixels
     uv = np.clip(uv, -1e6, 1e6) * [1.0, -1.0] + [0.0, 1.0]
-    pictures = {number: decode(looks.paints[number]) for number in np.unique(looks.paint).tolist()}
+    images = {number: decode(looks.paints[number]) for number in np.unique(looks.paint).tolist()}
     colors = _varied_colors(looks)
-    if len(pictures) == 1 and colors is None:
-        (number, picture), *_ = pictures.items()
+    if len(images) == 1 and colors is None:
+        (number, image), *_ = images.items()
         paint = looks.paints[number]
-        if picture is not None and paint.wrap == (REPEAT, REPEAT):
-            return PackedPicture(_tinted(picture, paint), uv, 1.0)
+        if image is not None and paint.wrap == (REPEAT, REPEAT):
+            return PackedImage(_tinted(image, paint), uv, 1.0)
     scale = 1.0
-    has_picture = any(picture is not None for picture in pictures.values())
+    has_image = any(image is not None for image in images.values())
     while True:
-        blocks = _blocks(looks, uv, colors, pictures, scale)
-        can_shrink = has_picture and scale > _LEAST_SCALE
+        blocks = _blocks(looks, uv, colors, images, scale)
+        can_shrink = has_image and scale > _LEAST_SCALE
         found = _laid_out(blocks, count, _LONGEST_SIDE if can_shrink else None, scale)
         if found is not None:
             return found
@@ -126,31 +126,31 @@ def _blocks(
     looks: Looks,
     uv: NDArray[np.float64],
     colors: NDArray[np.float64] | None,
-    pictures: dict[int, NDArray[np.uint8] | None],
+    images: dict[int, NDArray[np.uint8] | None],
     scale: float,
 ) -> list[_Block]:
-    """Blocks that hold all triangles: of pictures, of pictures times colours, of plain colours."""
+    """Blocks that hold all triangles: of images, of images times colours, of plain colours."""
     blocks = []
     plain = np.zeros(len(uv), dtype=bool)
     # linear light and opacity of triangles that are plain, at their corners
     shades = np.ones((len(uv), 3, 4))
-    for number, picture in pictures.items():
+    for number, image in images.items():
         paint = looks.paints[number]
         triangles = np.flatnonzero(looks.paint == number)
-        if picture is None:
+        if image is None:
             plain[triangles] = True
             shades[triangles] = _factor(paint)
             continue
         local = _near_origin(uv[triangles], paint.wrap)
         endless = np.ptp(local, axis=1).max(axis=1) > _MOST_REPEATS
         plain[triangles[endless]] = True
-        shades[triangles[endless]] = _mean(picture) * _factor(paint)
+        shades[triangles[endless]] = _mean(image) * _factor(paint)
         rest = triangles[~endless]
         if not len(rest):
             continue
-        smaller = _scaled(picture, scale)
+        smaller = _scaled(image, scale)
         if colors is None:
-            blocks.append(_picture_block(smaller, paint, rest, local[~endless]))
+            blocks.append(_image_block(smaller, paint, rest, local[~endless]))
         else:
             blocks += _triangle_blocks(smaller, paint, rest, local[~endless], colors[rest])
     if plain.any():
@@ -165,13 +165,13 @@ def _factor(paint: Paint) -> NDArray[np.float64]:
     return np.clip(np.nan_to_num(np.array(paint.color)), 0.0, 1.0)
 
 
-def _mean(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Mean of a picture, linear light and opacity."""
-    return _linear(picture).mean(axis=(0, 1))
+def _mean(image: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Mean of an image, linear light and opacity."""
+    return _linear(image).mean(axis=(0, 1))
 
 
 def _near_origin(uv: NDArray[np.float64], wrap: tuple[str, str]) -> NDArray[np.float64]:
-    """Coordinates moved by whole pictures, so that each triangle's middle is in the first one."""
+    """Coordinates moved by whole images, so that each triangle's middle is in the first one."""
     moved = uv.copy()
     for axis, mode in enumerate(wrap):
         middle = uv[..., axis].mean(axis=1, keepdims=True)
@@ -180,37 +180,37 @@ def _near_origin(uv: NDArray[np.float64], wrap: tuple[str, str]) -> NDArray[np.f
         elif mode == MIRROR:
             moved[..., axis] -= 2 * np.floor(middle / 2)
         else:
-            # beyond its edge a clamped picture is the same everywhere
+            # beyond its edge a clamped image is the same everywhere
             moved[..., axis] = np.clip(uv[..., axis], -_MOST_REPEATS / 2, _MOST_REPEATS / 2)
     return moved
 
 
-def _scaled(picture: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
-    height, width = picture.shape[:2]
+def _scaled(image: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
+    height, width = image.shape[:2]
     size = max(1, round(scale * width)), max(1, round(scale * height))
     if size == (width, height):
-        return picture
-    return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.BOX))
+        return image
+    return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BOX))
 
 
-def _picture_block(
-    picture: NDArray[np.uint8],
+def _image_block(
+    image: NDArray[np.uint8],
     paint: Paint,
     triangles: NDArray[np.int64],
     uv: NDArray[np.float64],
 ) -> _Block:
-    """The part of a picture that triangles show, with what lies beyond its edges."""
-    height, width = picture.shape[:2]
+    """The part of an image that triangles show, with what lies beyond its edges."""
+    height, width = image.shape[:2]
     places = uv * [width, height]
     low = np.floor(places.min(axis=(0, 1))).astype(np.int64) - _MARGIN
     high = np.ceil(places.max(axis=(0, 1))).astype(np.int64) + _MARGIN
     columns = _wrapped(np.arange(low[0], high[0]), width, paint.wrap[0])
     rows = _wrapped(np.arange(low[1], high[1]), height, paint.wrap[1])
-    return _Block(_tinted(picture, paint)[np.ix_(rows, columns)], triangles, places - low)
+    return _Block(_tinted(image, paint)[np.ix_(rows, columns)], triangles, places - low)
 
 
 def _wrapped(index: NDArray[np.int64], size: int, mode: str) -> NDArray[np.int64]:
-    """Pixels of a picture that are seen at places within it and beyond."""
+    """Pixels of an image that are seen at places within it and beyond."""
     if mode == CLAMP:
         return np.clip(index, 0, size - 1)
     if mode == MIRROR:
@@ -220,17 +220,17 @@ def _wrapped(index: NDArray[np.int64], size: int, mode: str) -> NDArray[np.int64
 
 
 def _triangle_blocks(
-    picture: NDArray[np.uint8],
+    image: NDArray[np.uint8],
     paint: Paint,
     triangles: NDArray[np.int64],
     uv: NDArray[np.float64],
     colors: NDArray[np.float64],
 ) -> list[_Block]:
-    """Blocks of triangles, each with a square of its own: the picture times the corners' colours.
+    """Blocks of triangles, each with a square of its own: the image times the corners' colours.
 
-    The squares' sides are powers of two, about as many pixels as the picture has there.
+    The squares' sides are powers of two, about as many pixels as the image has there.
     """
-    height, width = picture.shape[:2]
+    height, width = image.shape[:2]
     places = uv * [width, height]
     sides = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2).max(axis=1)
     levels = np.ceil(np.log2(np.clip(sides, _SMALLEST_TRIANGLE, _LARGEST_TRIANGLE))).astype(int)
@@ -242,31 +242,31 @@ def _triangle_blocks(
         # half a square's pixels lie beyond the triangle, and go on linearly
         at = np.einsum("rck,mkx->mrcx", weights, places[chosen])
         tint = np.clip(np.einsum("rck,mkx->mrcx", weights, colors[chosen]), 0.0, 1.0)
-        values = _sampled(_linear(picture), at, paint.wrap) * _factor(paint) * tint
+        values = _sampled(_linear(image), at, paint.wrap) * _factor(paint) * tint
         blocks.append(_grid(_encoded(values, paint), triangles[chosen]))
     return blocks
 
 
 def _sampled(
-    picture: NDArray[np.float64], at: NDArray[np.float64], wrap: tuple[str, str]
+    image: NDArray[np.float64], at: NDArray[np.float64], wrap: tuple[str, str]
 ) -> NDArray[np.float64]:
-    """Linear interpolation between the pixels of a picture at places [..., 2]."""
-    height, width = picture.shape[:2]
+    """Linear interpolation between the pixels of an image at places [..., 2]."""
+    height, width = image.shape[:2]
     low = np.floor(at - 0.5)
     share = at - 0.5 - low
     column, row = np.moveaxis(low.astype(np.int64), -1, 0)
     columns = [_wrapped(column + k, width, wrap[0]) for k in (0, 1)]
     rows = [_wrapped(row + k, height, wrap[1]) for k in (0, 1)]
     across, down = np.moveaxis(share, -1, 0)[..., None]
-    upper = picture[rows[0], columns[0]] * (1 - across) + picture[rows[0], columns[1]] * across
-    lower = picture[rows[1], columns[0]] * (1 - across) + picture[rows[1], columns[1]] * across
+    upper = image[rows[0], columns[0]] * (1 - across) + image[rows[0], columns[1]] * across
+    lower = image[rows[1], columns[0]] * (1 - across) + image[rows[1], columns[1]] * across
     return upper * (1 - down) + lower * down
 
 
 def _plain_blocks(
     triangles: NDArray[np.int64], shades: NDArray[np.float64], looks: Looks
 ) -> list[_Block]:
-    """Blocks of triangles without a picture: squares of one colour, or of the corners' colours.
+    """Blocks of triangles without an image: squares of one colour, or of the corners' colours.
 
     `shades` [k, 3, 4] are linear light and opacity of the corners.
     """
@@ -319,23 +319,23 @@ def _grid(squares: NDArray[np.uint8], triangles: NDArray[np.int64]) -> _Block:
     return _Block(pixels.reshape(down * side, across * side, 4), triangles, places)
 
 
-def _tinted(picture: NDArray[np.uint8], paint: Paint) -> NDArray[np.uint8]:
-    """A picture times the colour of a material."""
+def _tinted(image: NDArray[np.uint8], paint: Paint) -> NDArray[np.uint8]:
+    """A image times the colour of a material."""
     factor = _factor(paint)
-    pixels = picture.copy()
-    pixels[..., 3] = _opacity(picture[..., 3] / 255 * factor[3], paint)
+    pixels = image.copy()
+    pixels[..., 3] = _opacity(image[..., 3] / 255 * factor[3], paint)
     if (factor[:3] == 1).all():
         return pixels
     # each channel has 256 values: a table is exact and fast
     table = _encode(srgb_to_linear(np.arange(256) / 255)[:, None] * factor[:3])
     for channel in range(3):
-        pixels[..., channel] = table[:, channel][picture[..., channel]]
+        pixels[..., channel] = table[:, channel][image[..., channel]]
     return pixels
 
 
-def _linear(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
+def _linear(image: NDArray[np.uint8]) -> NDArray[np.float64]:
     """Linear light and opacity of pixels."""
-    linear = picture / 255
+    linear = image / 255
     linear[..., :3] = srgb_to_linear(linear[..., :3])
     return linear
 
@@ -374,7 +374,7 @@ def _opacity(opacity: NDArray[np.float64], paint: Paint) -> NDArray[np.uint8]:
 
 def _laid_out(
     blocks: list[_Block], count: int, longest: int | None, scale: float
-) -> PackedPicture | None:
+) -> PackedImage | None:
     """Blocks on shelves, the highest first; None if a side would be too long."""
     order = sorted(range(len(blocks)), key=lambda i: (-blocks[i].pixels.shape[0], i))
     area = sum(block.pixels.shape[0] * block.pixels.shape[1] for block in blocks)
@@ -405,7 +405,7 @@ def _laid_out(
         pixels[top : top + rows, left : left + columns] = block.pixels
         places = block.places + np.array([left, top])
         uv[block.triangles] = places / [width, height]
-    return PackedPicture(pixels, uv, scale)
+    return PackedImage(pixels, uv, scale)
 
 
 def _aligned(length: int) -> int:

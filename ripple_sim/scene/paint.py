@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.mesh.looks import MASK, Looks, Paint, Picture
+from ripple_sim.solver.mesh.looks import MASK, ImageSource, Looks, Paint
 
+from .material_images import MaterialImages, load_image, with_holes_or_opaque
 from .packing import packed
-from .pictures import Pictures, load_image, with_holes_or_opaque
 
 # Endings of the image NAME_texture beside a mesh file.
 _IMAGE_ENDINGS = (".png", ".jpg", ".jpeg")
 
-# Pictures that are scaled by less than this are told of.
+# MaterialImages that are scaled by less than this are told of.
 _NOTED_SCALE = 0.7
 
 
@@ -61,7 +61,7 @@ def paint_target(
     if texture is not None:
         painting = _of_image(mesh, mesh_path, texture)
     else:
-        if mesh.corner_uv is not None and not _has_picture(looks):
+        if mesh.corner_uv is not None and not _has_image(looks):
             looks = _looks_beside(Path(mesh_path), len(mesh.F)) or looks
         if looks is None:
             return ()
@@ -103,21 +103,23 @@ def _of_image(mesh: Mesh, mesh_path: str | Path, texture: str | Path) -> Paintin
 
 
 def _of_looks(mesh: Mesh, looks: Looks) -> Painting:
-    """The looks of a mesh, packed into one picture."""
-    pictures = Pictures()
-    looks, transparent = with_holes_or_opaque(looks, pictures)
-    picture = packed(looks, mesh.corner_uv, pictures.of)
+    """The looks of a mesh, packed into one image."""
+    images = MaterialImages()
+    looks, transparent = with_holes_or_opaque(looks, images)
+    image = packed(looks, mesh.corner_uv, images.of)
     has_holes = any(paint.alpha == MASK for paint in looks.paints)
-    has_holes = has_holes and bool((picture.pixels[..., 3] < 255).any())
-    pixels = picture.pixels if has_holes else np.ascontiguousarray(picture.pixels[..., :3])
-    metallic, roughness = _mean_gloss(mesh, looks, pictures)
-    notes = (*looks.notes, *pictures.notes(), *transparent)
-    if picture.scale < _NOTED_SCALE:
-        notes = (*notes, f"its pictures are scaled to {picture.scale:.0%} to fit into one texture")
-    return Painting(pixels, picture.uv, metallic, roughness, notes)
+    has_holes = has_holes and bool((image.pixels[..., 3] < 255).any())
+    pixels = image.pixels if has_holes else np.ascontiguousarray(image.pixels[..., :3])
+    metallic, roughness = _mean_gloss(mesh, looks, images)
+    notes = (*looks.notes, *images.notes(), *transparent)
+    if image.scale < _NOTED_SCALE:
+        notes = (*notes, f"its images are scaled to {image.scale:.0%} to fit into one texture")
+    return Painting(pixels, image.uv, metallic, roughness, notes)
 
 
-def _mean_gloss(mesh: Mesh, looks: Looks, pictures: Pictures) -> tuple[float | None, float | None]:
+def _mean_gloss(
+    mesh: Mesh, looks: Looks, images: MaterialImages
+) -> tuple[float | None, float | None]:
     """Metallic and roughness of the materials, weighted by area; None where none has any."""
     areas = np.bincount(looks.paint, weights=mesh.triangle_areas, minlength=len(looks.paints))
     metallic = []
@@ -125,7 +127,7 @@ def _mean_gloss(mesh: Mesh, looks: Looks, pictures: Pictures) -> tuple[float | N
     for paint, area in zip(looks.paints, areas.tolist(), strict=True):
         if area <= 0:
             continue
-        metal_factor, rough_factor = pictures.gloss(paint)
+        metal_factor, rough_factor = images.gloss(paint)
         if paint.metallic is not None:
             metallic.append((area, metal_factor * paint.metallic))
         if paint.roughness is not None:
@@ -141,11 +143,11 @@ def _mean(weighted: list[tuple[float, float]]) -> float | None:
     return float(np.clip(np.average(values, weights=weights), 0.0, 1.0))
 
 
-def _has_picture(looks: Looks | None) -> bool:
-    """Whether a material has a picture."""
+def _has_image(looks: Looks | None) -> bool:
+    """Whether a material has an image."""
     if looks is None or not looks.paints:
         return False
-    return any(looks.paints[number].picture is not None for number in np.unique(looks.paint))
+    return any(looks.paints[number].image is not None for number in np.unique(looks.paint))
 
 
 def _looks_beside(mesh_path: Path, count: int) -> Looks | None:
@@ -153,6 +155,6 @@ def _looks_beside(mesh_path: Path, count: int) -> Looks | None:
     for ending in _IMAGE_ENDINGS:
         path = mesh_path.with_name(f"{mesh_path.stem}_texture{ending}")
         if path.is_file():
-            paint = Paint(picture=Picture(path, path.name))
+            paint = Paint(image=ImageSource(path, path.name))
             return Looks((paint,), np.zeros(count, np.int64))
     return None

@@ -1,7 +1,7 @@
 """Looks: the colours that the author of a file gave its triangles.
 
 A triangle has a material, and its corners have texture coordinates and, in some files, colours.
-The colour of a point is the material's colour times its picture times the corners' colours, all of
+The colour of a point is the material's colour times its image times the corners' colours, all of
 them linear light.
 """
 
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-# Ways in which a picture goes on beyond its edges.
+# Ways in which an image goes on beyond its edges.
 REPEAT = "repeat"
 CLAMP = "clamp"
 MIRROR = "mirror"
@@ -28,7 +28,7 @@ MASK_CUTOFF = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
-class Picture:
+class ImageSource:
     """An image that a file names or holds.
 
     Attributes
@@ -51,31 +51,31 @@ class Paint:
     ----------
     color : tuple
         Red, green, blue (linear light) and opacity, 0 to 1.
-    picture : Picture, optional
+    image : ImageSource, optional
         sRGB and opacity, in the texture coordinates of the corners.
-    opacity : Picture, optional
-        Its brightness is the opacity, in place of the opacity of `picture`.
+    opacity : ImageSource, optional
+        Its brightness is the opacity, in place of the opacity of `image`.
     wrap : (str, str)
-        How the pictures go on beyond their edges along u and v: `REPEAT`, `CLAMP` or `MIRROR`.
+        How the images go on beyond their edges along u and v: `REPEAT`, `CLAMP` or `MIRROR`.
     alpha : str
         How opacity counts: `OPAQUE` (not at all), `MASK` or `BLEND`.
     cutoff : float
         Opacity below which a `MASK` has holes.
     metallic, roughness : float, optional
         0 to 1; None where the file gives none.
-    gloss : Picture, optional
+    gloss : ImageSource, optional
         Factors of roughness (green) and metallic (blue).
     """
 
     color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    picture: Picture | None = None
-    opacity: Picture | None = None
+    image: ImageSource | None = None
+    opacity: ImageSource | None = None
     wrap: tuple[str, str] = (REPEAT, REPEAT)
     alpha: str = OPAQUE
     cutoff: float = MASK_CUTOFF
     metallic: float | None = None
     roughness: float | None = None
-    gloss: Picture | None = None
+    gloss: ImageSource | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Looks:
     colors : float64 [triangle_count, 3, 4] or None
         Linear light and opacity of the corners, 0 to 1, by which the materials are multiplied.
     notes : tuple of str
-        What the file has and the looks lack, such as a lost picture, one line each.
+        What the file has and the looks lack, such as a lost image, one line each.
     """
 
     paints: tuple[Paint, ...]

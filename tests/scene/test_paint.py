@@ -10,17 +10,17 @@ from PIL import Image
 
 from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
 from ripple_sim.scene import drop_scene
+from ripple_sim.scene.material_images import MaterialImages, load_image
 from ripple_sim.scene.packing import packed
 from ripple_sim.scene.paint import paint_target
-from ripple_sim.scene.pictures import Pictures, load_image
 from ripple_sim.solver import Mesh, load_mesh
-from ripple_sim.solver.mesh.looks import CLAMP, MIRROR, REPEAT, Looks, Paint, Picture
+from ripple_sim.solver.mesh.looks import CLAMP, MIRROR, REPEAT, ImageSource, Looks, Paint
 
 RED = (255, 0, 0)
 BLUE = (0, 0, 255)
 RNG = np.random.default_rng(0)
 PIXELS = RNG.integers(0, 256, (4, 6, 3), dtype=np.uint8)
-PICTURE = Picture(png(PIXELS), "picture")
+IMAGE = ImageSource(png(PIXELS), "image")
 # two triangles of a square, with texture coordinates
 UV = SQUARE_UV[[[0, 1, 2], [0, 2, 3]]] * [1, -1] + [0, 1]
 
@@ -46,10 +46,10 @@ WRAPS = {
 }
 
 
-def seen(picture, triangle: int, weights: np.ndarray) -> np.ndarray:
+def seen(image, triangle: int, weights: np.ndarray) -> np.ndarray:
     """Linear light that a renderer shows at a point of a triangle."""
-    place = weights @ picture.uv[triangle] * picture.pixels.shape[1::-1]
-    return bilinear(picture.pixels, place, WRAPS[REPEAT])
+    place = weights @ image.uv[triangle] * image.pixels.shape[1::-1]
+    return bilinear(image.pixels, place, WRAPS[REPEAT])
 
 
 def points(count: int = 20) -> np.ndarray:
@@ -59,65 +59,69 @@ def points(count: int = 20) -> np.ndarray:
 @pytest.mark.parametrize("wrap", WRAPS)
 @pytest.mark.parametrize("shift", [0.0, 0.3, -2.7])
 @pytest.mark.parametrize("scale", [1.0, 2.5])
-def test_a_packed_picture_shows_what_the_sampler_shows(wrap: str, shift: float, scale) -> None:
-    """Another material beside it keeps the picture from staying as it is."""
-    paints = (Paint((0.5, 1, 1, 1), PICTURE, wrap=(wrap, wrap)), Paint((0, 0, 1, 1)))
+def test_a_packed_image_shows_what_the_sampler_shows(wrap: str, shift: float, scale) -> None:
+    """Another material beside it keeps the image from staying as it is."""
+    paints = (Paint((0.5, 1, 1, 1), IMAGE, wrap=(wrap, wrap)), Paint((0, 0, 1, 1)))
     uv = np.concatenate([scale * UV + shift, UV])
-    picture = packed(Looks(paints, np.array([0, 0, 1, 1])), uv, Pictures().of)
+    image = packed(Looks(paints, np.array([0, 0, 1, 1])), uv, MaterialImages().of)
     for triangle in range(2):
         for weights in points():
             u, v = weights @ uv[triangle]
             truth = bilinear(PIXELS, np.array([6 * u, 4 * (1 - v)]), WRAPS[wrap]) * [0.5, 1, 1]
-            np.testing.assert_allclose(seen(picture, triangle, weights), truth, atol=0.01)
+            np.testing.assert_allclose(seen(image, triangle, weights), truth, atol=0.01)
     for weights in points(5):
-        np.testing.assert_allclose(seen(picture, 2, weights), [0, 0, 1], atol=1e-9)
+        np.testing.assert_allclose(seen(image, 2, weights), [0, 0, 1], atol=1e-9)
 
 
-def test_a_single_picture_that_repeats_stays_bit_for_bit() -> None:
-    looks = Looks((Paint(picture=PICTURE),), np.zeros(2, np.int64), np.ones((2, 3, 4)))
-    picture = packed(looks, 3 * UV, Pictures().of)
-    np.testing.assert_array_equal(picture.pixels[..., :3], PIXELS)
-    np.testing.assert_array_equal(picture.uv, 3 * UV * [1, -1] + [0, 1])
+def test_a_single_image_that_repeats_stays_bit_for_bit() -> None:
+    looks = Looks((Paint(image=IMAGE),), np.zeros(2, np.int64), np.ones((2, 3, 4)))
+    image = packed(looks, 3 * UV, MaterialImages().of)
+    np.testing.assert_array_equal(image.pixels[..., :3], PIXELS)
+    np.testing.assert_array_equal(image.uv, 3 * UV * [1, -1] + [0, 1])
 
 
 def test_colours_of_corners_are_linear_and_sharp_at_borders() -> None:
     colors = np.ones((3, 3, 4))
     colors[..., :3] = np.random.default_rng(2).random((3, 3, 3))
     colors[2, :, :3] = [[1, 1, 0], [0, 0, 0], [0, 0, 1]]
-    picture = packed(Looks((Paint((1, 0.5, 1, 1)),), np.zeros(3, int), colors), None, Pictures().of)
+    image = packed(
+        Looks((Paint((1, 0.5, 1, 1)),), np.zeros(3, int), colors), None, MaterialImages().of
+    )
     for triangle in range(3):
         for weights in points():
             truth = weights @ colors[triangle, :, :3] * [1, 0.5, 1]
-            np.testing.assert_allclose(seen(picture, triangle, weights), truth, atol=0.04)
+            np.testing.assert_allclose(seen(image, triangle, weights), truth, atol=0.04)
 
 
-def test_a_picture_times_the_colours_of_corners() -> None:
+def test_an_image_times_the_colours_of_corners() -> None:
     smooth = Image.fromarray(PIXELS).resize((64, 64), Image.Resampling.BICUBIC)
     colors = np.random.default_rng(2).random((2, 3, 4))
-    looks = Looks((Paint(picture=Picture(png(smooth), "p")),), np.zeros(2, int), colors)
-    picture = packed(looks, UV, Pictures().of)
+    looks = Looks((Paint(image=ImageSource(png(smooth), "p")),), np.zeros(2, int), colors)
+    image = packed(looks, UV, MaterialImages().of)
     for triangle in range(2):
         for weights in points():
             place = weights @ (UV[triangle] * [64, -64] + [0, 64])
             truth = bilinear(np.asarray(smooth), place, WRAPS[REPEAT])
             truth = truth * (weights @ colors[triangle, :, :3])
-            np.testing.assert_allclose(seen(picture, triangle, weights), truth, atol=0.03)
+            np.testing.assert_allclose(seen(image, triangle, weights), truth, atol=0.03)
 
 
-def test_pictures_that_do_not_fit_are_scaled_and_endless_ones_are_their_mean() -> None:
-    large = Picture(png(np.repeat(np.uint8([[RED, BLUE]]), 1024, axis=1).repeat(2048, 0)), "large")
-    paints = (Paint(picture=large), Paint((0.5, 1, 1, 1), picture=large), Paint(picture=PICTURE))
+def test_image_that_do_not_fit_are_scaled_and_endless_ones_are_their_mean() -> None:
+    large = ImageSource(
+        png(np.repeat(np.uint8([[RED, BLUE]]), 1024, axis=1).repeat(2048, 0)), "large"
+    )
+    paints = (Paint(image=large), Paint((0.5, 1, 1, 1), image=large), Paint(image=IMAGE))
     uv = np.concatenate([3 * UV, 2 * UV, 1000 * UV])
     looks = Looks(paints, np.repeat([0, 1, 2], 2))
-    picture = packed(looks, uv, Pictures().of)
-    assert picture.scale < 1 and max(picture.pixels.shape) <= 4096
+    image = packed(looks, uv, MaterialImages().of)
+    assert image.scale < 1 and max(image.pixels.shape) <= 4096
     mean = srgb_to_linear(PIXELS / 255).mean(axis=(0, 1))
-    np.testing.assert_allclose(seen(picture, 4, points(1)[0]), mean, atol=0.01)
+    np.testing.assert_allclose(seen(image, 4, points(1)[0]), mean, atol=0.01)
     for weights in points():
         u = (weights @ uv[0])[0] % 1
         if 0.01 < u % 0.5 < 0.49:
             truth = [1, 0, 0] if u < 0.5 else [0, 0, 1]
-            np.testing.assert_allclose(seen(picture, 0, weights), truth, atol=1e-6)
+            np.testing.assert_allclose(seen(image, 0, weights), truth, atol=1e-6)
 
 
 def test_a_mask_is_whole_or_open_and_its_texture_has_opacity(tmp_path: Path) -> None:
@@ -167,8 +171,8 @@ def test_half_transparent_materials_are_told_of_and_gloss_is_the_mean(tmp_path: 
     assert model.mat_roughness[0] == pytest.approx((128 / 255 + 9) / 10)
 
 
-def test_lost_pictures_are_told_of_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "damaged.png").write_bytes(b"no picture")
+def test_lost_image_are_told_of_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "damaged.png").write_bytes(b"no image")
     file = Gltf()
     sources = [
         {"uri": "damaged.png"},
@@ -185,7 +189,7 @@ def test_lost_pictures_are_told_of_in_one_line(tmp_path: Path) -> None:
     model, notes = painted(load_mesh(file.write(tmp_path / "a.glb")))
     assert len(notes) == 1
     assert notes[0].startswith(
-        "3 of 3 pictures are not shown: picture 'damaged.png' cannot be read: it is damaged"
+        "3 of 3 images are not shown: image 'damaged.png' cannot be read: it is damaged"
     )
     assert "'gone.png' is missing, 'compressed' is KTX2" in notes[0]
     assert (model.tex_data.reshape(-1, 3)[0] == [0, 255, 0]).all()
@@ -193,7 +197,7 @@ def test_lost_pictures_are_told_of_in_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("mode", ["I;16", "F", "LA", "P", "1", "CMYK"])
 @pytest.mark.parametrize("kind", ["png", "tif"])
-def test_pictures_of_every_depth_become_bytes(tmp_path: Path, mode: str, kind: str) -> None:
+def test_image_of_every_depth_become_bytes(tmp_path: Path, mode: str, kind: str) -> None:
     grey = np.array([[0, 64], [128, 255]], np.uint8)
     if mode == "I;16":
         image = Image.fromarray(grey.astype(np.uint16) * 257)

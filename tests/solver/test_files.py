@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ripple_sim.scene import check_files, load_image, picture_pixels
+from ripple_sim.scene import check_files, image_pixels, load_image
 from ripple_sim.solver import (
     AtlasError,
     HeightMap,
@@ -28,7 +28,7 @@ from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.images import read_image
 from ripple_sim.solver.layouts import build_atlas
 from ripple_sim.solver.memory import require_memory, rooms
-from ripple_sim.solver.mesh.looks import Picture
+from ripple_sim.solver.mesh.looks import ImageSource
 from ripple_sim.solver.texels import texture_map
 
 
@@ -221,8 +221,8 @@ READERS: dict[str, Callable[[Path], object]] = {
     "texture of the command line": load_image,
     "map of a material": lambda path: texture_map(with_coordinates(), path, 0.0, 1.0),
     "texture of a model": lambda path: check_files(model(path)),
-    "picture of a material": lambda path: picture_pixels(Picture(path, path.name)),
-    "picture in a GLB": lambda path: picture_pixels(Picture(path.read_bytes(), path.name)),
+    "image of a material": lambda path: image_pixels(ImageSource(path, path.name)),
+    "image in a GLB": lambda path: image_pixels(ImageSource(path.read_bytes(), path.name)),
     "image of a look": lambda path: read_image(
         RippleError, path, "texture image", lambda mode: "RGB"
     ),

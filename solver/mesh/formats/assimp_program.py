@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-# Number of a picture of diffuse or base colour in assimp's list of a material's textures.
-_PICTURES = (12, 1)
+# Number of an image of diffuse or base colour in assimp's list of a material's textures.
+_IMAGES = (12, 1)
 
 
 def main(source: str, target: str) -> None:
@@ -77,14 +77,14 @@ def _colors(mesh: Any, count: int) -> np.ndarray:
 
 
 def _material(material: dict[str, Any]) -> dict[str, Any]:
-    """Colour, opacity and picture of a material of assimp."""
+    """Colour, opacity and image of a material of assimp."""
     color = material.get("COLOR_DIFFUSE", (1.0, 1.0, 1.0))
     textures = material.get("TEXTURES", {})
-    pictures = [name for number in _PICTURES for name in textures.get(number, ())]
+    images = [name for number in _IMAGES for name in textures.get(number, ())]
     return {
         "color": [float(value) for value in color[:3]],
         "opacity": float(material.get("OPACITY", 1.0)),
-        "picture": pictures[0] if pictures else None,
+        "image": images[0] if images else None,
     }
 
 

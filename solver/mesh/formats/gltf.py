@@ -58,7 +58,7 @@ class _Part(NamedTuple):
     V : float64 [n, 3]
     F : int64 [m, 3]
     uv : float64 [n, 2] or None
-        Texture coordinates of the picture; v is counted from the upper edge.
+        Texture coordinates of the image; v is counted from the upper edge.
     colors : float64 [n, 4] or None
         Linear light and opacity.
     material : int

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...errors import MeshError
 from ...memory import require_memory
-from ..looks import Picture
+from ..looks import ImageSource
 
 # The first bytes of the binary container, and the types of its chunks (section 4.4).
 _MAGIC = b"glTF"
@@ -208,15 +208,15 @@ class Document:
                 self._buffers[index] = source
         return self._buffers[index]
 
-    def picture(self, index: Any) -> Picture:
+    def image(self, index: Any) -> ImageSource:
         """An image of the file; the file that it names may be missing."""
         image = self.entry("images", index)
         name = str(image.get("name") or f"image {index}")
         if "uri" not in image:
-            return Picture(self.view(image.get("bufferView")), name)
+            return ImageSource(self.view(image.get("bufferView")), name)
         uri = str(image["uri"])
         source = self._resource(uri)
-        return Picture(source, name if isinstance(source, bytes) else unquote(uri)[:80])
+        return ImageSource(source, name if isinstance(source, bytes) else unquote(uri)[:80])
 
     def _resource(self, uri: str) -> Path | bytes:
         """The file that a URI names, or the data that it holds."""

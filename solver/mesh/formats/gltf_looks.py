@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MeshError
-from ..looks import BLEND, CLAMP, MASK, MASK_CUTOFF, MIRROR, OPAQUE, REPEAT, Paint, Picture
+from ..looks import BLEND, CLAMP, MASK, MASK_CUTOFF, MIRROR, OPAQUE, REPEAT, ImageSource, Paint
 from .gltf_document import Document
 
 # Wrap modes of samplers (section 3.8.4.2).
@@ -42,7 +42,7 @@ _NOT_SHOWN = {
 
 
 class GltfMaterial(NamedTuple):
-    """A material, and the texture coordinates of its picture.
+    """A material, and the texture coordinates of its image.
 
     Attributes
     ----------
@@ -79,12 +79,12 @@ def gltf_material(document: Document, index: int) -> GltfMaterial:
         texture = source.get("baseColorTexture")
         metallic = _number(source.get("metallicFactor", 1.0))
         roughness = _number(source.get("roughnessFactor", 1.0))
-        gloss = _picture(document, source.get("metallicRoughnessTexture"))
-    picture = _picture(document, texture)
+        gloss = _image(document, source.get("metallicRoughnessTexture"))
+    image = _image(document, texture)
     red, green, blue, opacity = (_number(value) for value in [*color, 1.0, 1.0, 1.0, 1.0][:4])
     paint = Paint(
         color=(red, green, blue, opacity),
-        picture=picture,
+        image=image,
         wrap=_wrap(document, texture),
         alpha=_ALPHA_MODES.get(material.get("alphaMode", "OPAQUE"), OPAQUE),
         cutoff=_number(material.get("alphaCutoff", MASK_CUTOFF)),
@@ -107,17 +107,17 @@ def _not_shown(material: dict[str, Any]) -> frozenset[str]:
     return frozenset(words)
 
 
-def _picture(document: Document, texture_info: dict[str, Any] | None) -> Picture | None:
+def _image(document: Document, texture_info: dict[str, Any] | None) -> ImageSource | None:
     """The image of a material's texture, in the first of its formats that pillow reads."""
     if texture_info is None:
         return None
     texture = document.entry("textures", texture_info.get("index"))
     if "source" in texture:
-        return document.picture(texture["source"])
+        return document.image(texture["source"])
     extensions = texture.get("extensions", {})
     for name in _OTHER_IMAGES:
         if name in extensions:
-            return document.picture(extensions[name].get("source"))
+            return document.image(extensions[name].get("source"))
     return None
 
 

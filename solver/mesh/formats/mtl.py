@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from ..looks import BLEND, CLAMP, MASK, OPAQUE, REPEAT, Paint, Picture, linear_light
+from ..looks import BLEND, CLAMP, MASK, OPAQUE, REPEAT, ImageSource, Paint, linear_light
 from .text import decoded
 
 # Options of a texture and the most numbers or words that each takes.
@@ -126,26 +126,26 @@ def _material(said: dict[str, str], folders: list[Path]) -> ObjMaterial:
     texture = _texture(said.get("map_kd", ""), folders)
     opacity_texture = _texture(said.get("map_d", ""), folders)
     color = _color(said.get("kd", ""))
-    # a picture on black would not be seen: such lines mean the picture alone
-    if texture.picture is not None and max(color) == 0:
+    # an image on black would not be seen: such lines mean the image alone
+    if texture.image is not None and max(color) == 0:
         color = (1.0, 1.0, 1.0)
     opacity = _opacity(said)
     alpha = BLEND if opacity < 1 else OPAQUE
-    if opacity_texture.picture is not None:
+    if opacity_texture.image is not None:
         alpha = MASK
     not_shown = {words for keyword, words in _NOT_SHOWN.items() if said.get(keyword)}
     if said.get("ke") and max(_color(said["ke"])) > 0:
         not_shown.add("emission")
     paint = Paint(
         color=(*color, opacity),
-        picture=texture.picture,
-        opacity=opacity_texture.picture,
+        image=texture.image,
+        opacity=opacity_texture.image,
         wrap=(CLAMP, CLAMP) if texture.clamped else (REPEAT, REPEAT),
         alpha=alpha,
         metallic=_first_number(said.get("pm", "")),
         roughness=_first_number(said.get("pr", "")),
     )
-    source = texture if texture.picture is not None else opacity_texture
+    source = texture if texture.image is not None else opacity_texture
     return ObjMaterial(paint, source.scale, source.offset, frozenset(not_shown))
 
 
@@ -171,7 +171,7 @@ def _color(text: str) -> tuple[float, float, float]:
 class _Texture:
     """A texture statement."""
 
-    picture: Picture | None = None
+    image: ImageSource | None = None
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
     clamped: bool = False
@@ -203,8 +203,8 @@ def _texture(text: str, folders: list[Path]) -> _Texture:
     if not name:
         return _Texture()
     missing = folders[0] / PurePosixPath(_slashed(name)).name
-    picture = Picture(found_file(folders, name) or missing, name)
-    return _Texture(picture, scale, offset, clamped)
+    image = ImageSource(found_file(folders, name) or missing, name)
+    return _Texture(image, scale, offset, clamped)
 
 
 def found_file(folders: list[Path], name: str) -> Path | None:

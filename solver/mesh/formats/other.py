@@ -21,7 +21,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from ...errors import MeshError
-from ..looks import BLEND, OPAQUE, Looks, Paint, Picture, linear_light
+from ..looks import BLEND, OPAQUE, ImageSource, Looks, Paint, linear_light
 from ..soup import Soup
 from .mtl import found_file
 
@@ -130,16 +130,18 @@ def _soup(path: Path, arrays: dict[str, NDArray]) -> Soup:
 
 
 def _paint(path: Path, material: dict[str, Any]) -> Paint:
-    picture = None
-    if material["picture"] is not None:
-        name = str(material["picture"])
+    image = None
+    if material["image"] is not None:
+        name = str(material["image"])
         source = found_file([path.parent], name) or path.parent / name.replace("\\", "/")
-        picture = Picture(source, name if not name.startswith("*") else f"inside the file ({name})")
+        image = ImageSource(
+            source, name if not name.startswith("*") else f"inside the file ({name})"
+        )
     red, green, blue = linear_light(np.array(material["color"])).tolist()
-    if picture is not None and max(red, green, blue) == 0:
+    if image is not None and max(red, green, blue) == 0:
         red = green = blue = 1.0
     opacity = material["opacity"]
-    return Paint((red, green, blue, opacity), picture, alpha=BLEND if opacity < 1 else OPAQUE)
+    return Paint((red, green, blue, opacity), image, alpha=BLEND if opacity < 1 else OPAQUE)
 
 
 def _parts(scene: trimesh.Scene) -> Soup:

@@ -1,6 +1,6 @@
 """PLY files as triangles, text or binary, with the names under which programs store their looks.
 
-Colours and texture coordinates may belong to vertices or to faces; MeshLab names pictures in
+Colours and texture coordinates may belong to vertices or to faces; MeshLab names images in
 comments.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MeshError
-from ..looks import Looks, Paint, Picture, linear_light, unit_range, with_opacity
+from ..looks import ImageSource, Looks, Paint, linear_light, unit_range, with_opacity
 from ..soup import Soup, too_small, triangulate
 from .mtl import found_file
 
@@ -43,12 +43,12 @@ _COLOR_NAMES = (
     ("r", "g", "b", "a"),
 )
 
-# The comment with which MeshLab names a picture, in lower case.
-_PICTURE_COMMENT = "texturefile"
+# The comment with which MeshLab names an image, in lower case.
+_IMAGE_COMMENT = "texturefile"
 
-# Names of the vertices of a face, and the property that chooses a picture.
+# Names of the vertices of a face, and the property that chooses an image.
 _CORNER_NAMES = ("vertex_indices", "vertex_index")
-_PICTURE_NUMBER = "texnumber"
+_IMAGE_NUMBER = "texnumber"
 
 # What separates strips of triangles in their list of vertices.
 _STRIP_END = -1
@@ -268,20 +268,20 @@ def _looks(
     face: NDArray[np.int64],
     colors: NDArray[np.float64] | None,
 ) -> Looks | None:
-    """Looks of triangles: the pictures that comments name, and colours."""
+    """Looks of triangles: the images that comments name, and colours."""
     names = []
     for comment in comments:
         keyword, _, name = comment.partition(" ")
-        if keyword.lower() == _PICTURE_COMMENT and name.strip():
+        if keyword.lower() == _IMAGE_COMMENT and name.strip():
             names.append(name.strip())
     paints = tuple(
-        Paint(picture=Picture(found_file([path.parent], name) or path.parent / name, name))
+        Paint(image=ImageSource(found_file([path.parent], name) or path.parent / name, name))
         for name in names
     )
     paint = np.zeros(len(face), dtype=np.int64)
-    if len(names) > 1 and _PICTURE_NUMBER in faces:
-        numbers = np.nan_to_num(np.asarray(_flat(faces[_PICTURE_NUMBER]), dtype=np.float64))
-        # a face without a picture has the number -1
+    if len(names) > 1 and _IMAGE_NUMBER in faces:
+        numbers = np.nan_to_num(np.asarray(_flat(faces[_IMAGE_NUMBER]), dtype=np.float64))
+        # a face without an image has the number -1
         paint = np.clip(numbers, -1, len(names) - 1).astype(np.int64)[face]
         paints = (*paints, Paint())
         paint = np.where(paint < 0, len(names), paint)

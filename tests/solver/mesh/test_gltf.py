@@ -158,7 +158,7 @@ def test_transformed_and_second_texture_coordinates(tmp_path: Path) -> None:
         file.primitive(TEXCOORD_0=file.accessor(0 * SQUARE_UV), TEXCOORD_1=uv, material=material)
     )
     mesh = load_mesh(file.write(tmp_path / "a.glb"))
-    # the lower left quarter of the picture, as the extension's example says
+    # the lower left quarter of the image, as the extension's example says
     assert mesh.corner_uv.min() == pytest.approx(0) and mesh.corner_uv.max() == pytest.approx(0.5)
     x, y = np.moveaxis(mesh.V[mesh.F][..., :2], -1, 0)
     np.testing.assert_allclose(mesh.corner_uv, 0.5 * np.stack([1 - y, x], axis=-1), atol=1e-6)
@@ -194,7 +194,7 @@ def test_specular_glossiness_wrap_alpha_and_what_is_not_shown(tmp_path: Path) ->
     looks = load_mesh(file.write(tmp_path / "a.glb")).looks
     (paint,) = looks.paints
     assert (paint.wrap, paint.alpha, paint.cutoff) == (("clamp", "mirror"), "mask", 0.25)
-    assert paint.color == (1, 1, 1, 0.5) and paint.picture.source.startswith(b"\x89PNG")
+    assert paint.color == (1, 1, 1, 0.5) and paint.image.source.startswith(b"\x89PNG")
     assert looks.notes == ("not shown of its materials: colours without light, emission",)
 
 

@@ -13,7 +13,7 @@ from ripple_sim.solver.mesh.looks import linear_light
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 FACES = "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
-PICTURE = png([[[255, 0, 0]]])
+IMAGE = png([[[255, 0, 0]]])
 
 
 def square(folder: Path, mtl: str | None = None, head: str = "mtllib a.mtl\nusemtl m\n") -> Mesh:
@@ -49,19 +49,19 @@ def test_each_face_has_the_material_before_it(tmp_path: Path) -> None:
         ("map_Kd maps\\Tex.png", "maps/tex.PNG"),
     ],
 )
-def test_pictures_are_found_under_the_names_that_programs_write(
+def test_image_are_found_under_the_names_that_programs_write(
     tmp_path: Path, statement: str, file: str
 ) -> None:
     (tmp_path / "maps").mkdir()
-    (tmp_path / file).write_bytes(PICTURE)
+    (tmp_path / file).write_bytes(IMAGE)
     mesh = square(tmp_path, f"newmtl m\nKd 0 0 0\n{statement}\n")
     (paint,) = mesh.looks.paints
-    assert paint.picture.source == tmp_path / file
+    assert paint.image.source == tmp_path / file
     assert paint.color == (1, 1, 1, 1)
     np.testing.assert_array_equal(mesh.corner_uv, mesh.V[mesh.F][..., :2])
 
 
-def test_options_scale_move_and_clamp_the_picture_and_colours_multiply_it(tmp_path: Path) -> None:
+def test_options_scale_move_and_clamp_the_image_and_colours_multiply_it(tmp_path: Path) -> None:
     mtl = "newmtl m\nKd 0.5 0.5 1\nmap_Kd -s 3 2 -o 0.5 0.25 0 -clamp on a.png\nmap_d b.png\nKe 1 0 0\n"
     mesh = square(tmp_path, mtl + "norm n.png\nPm 0.5\nPr 0.75\n")
     (paint,) = mesh.looks.paints
@@ -180,9 +180,9 @@ def normals(mesh: Mesh) -> np.ndarray:
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
-def test_pictures_that_meshlab_names_in_comments(tmp_path: Path) -> None:
+def test_image_that_meshlab_names_in_comments(tmp_path: Path) -> None:
     for name in ("a b.png", "c.png"):
-        (tmp_path / name).write_bytes(PICTURE)
+        (tmp_path / name).write_bytes(IMAGE)
     content = (
         "ply\nformat ascii 1.0\ncomment TextureFile a b.png\ncomment TextureFile C.png\n"
         "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 3\n"
@@ -191,8 +191,8 @@ def test_pictures_that_meshlab_names_in_comments(tmp_path: Path) -> None:
         "3 0 1 2 6 0 0 1 0 0 1 1\n3 0 1 3 6 0 0 1 0 0 1 0\n3 1 2 3 6 0 0 1 0 0 1 -1\n"
     )
     looks = load_mesh(written(tmp_path, "a.ply", content)).looks
-    pictures = [looks.paints[number].picture for number in looks.paint]
-    assert [each and each.source for each in pictures] == [
+    images = [looks.paints[number].image for number in looks.paint]
+    assert [each and each.source for each in images] == [
         tmp_path / "c.png",
         tmp_path / "a b.png",
         None,

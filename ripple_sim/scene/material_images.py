@@ -1,4 +1,4 @@
-"""Pictures of a mesh's materials: decoded, with one line on those that are lost."""
+"""MaterialImages of a mesh's materials: decoded, with one line on those that are lost."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from PIL import Image
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.images import read_image
-from ripple_sim.solver.mesh.looks import BLEND, MASK, OPAQUE, Looks, Paint, Picture
+from ripple_sim.solver.mesh.looks import BLEND, MASK, OPAQUE, ImageSource, Looks, Paint
 
-# First bytes of KTX2 files, whose pictures are compressed for graphics cards.
+# First bytes of KTX2 files, whose images are compressed for graphics cards.
 _KTX2 = b"\xabKTX 20\xbb"
 
-# Names of lost pictures in a message, at most.
+# Names of lost images in a message, at most.
 _MOST_NAMES = 3
 
 
@@ -30,39 +30,39 @@ def load_image(source: Any) -> NDArray[np.uint8]:
     return read_image(SceneError, source, "texture", lambda mode: "RGB")
 
 
-def picture_pixels(picture: Picture) -> NDArray[np.uint8]:
-    """Pixels of a picture, uint8 [height, width, 4], sRGB and opacity, top row first.
+def image_pixels(image: ImageSource) -> NDArray[np.uint8]:
+    """Pixels of an image, uint8 [height, width, 4], sRGB and opacity, top row first.
 
-    Raises `SceneError` if the picture is missing or cannot be read.
+    Raises `SceneError` if the image is missing or cannot be read.
     """
-    source = picture.source
+    source = image.source
     if isinstance(source, Path):
         try:
             found = source.is_file()
         except (OSError, ValueError):  # a name that the system does not allow
             found = False
         if not found:
-            raise SceneError(f"{shown(picture.name)} is missing")
+            raise SceneError(f"{shown(image.name)} is missing")
         try:
             source = source.read_bytes()
         except OSError as error:
-            raise SceneError(f"{shown(picture.name)} cannot be read: {error.strerror}") from error
+            raise SceneError(f"{shown(image.name)} cannot be read: {error.strerror}") from error
     if source.startswith(_KTX2):
-        raise SceneError(f"{shown(picture.name)} is KTX2 (Basis Universal), which is not read")
-    return read_image(SceneError, source, f"picture {shown(picture.name)}", lambda mode: "RGBA")
+        raise SceneError(f"{shown(image.name)} is KTX2 (Basis Universal), which is not read")
+    return read_image(SceneError, source, f"image {shown(image.name)}", lambda mode: "RGBA")
 
 
 @dataclasses.dataclass
-class Pictures:
-    """Decodes the pictures of materials, each once, and keeps account of those that are lost."""
+class MaterialImages:
+    """Decodes the images of materials, each once, and keeps account of those that are lost."""
 
-    _pixels: dict[Picture, NDArray[np.uint8] | None] = dataclasses.field(default_factory=dict)
+    _pixels: dict[ImageSource, NDArray[np.uint8] | None] = dataclasses.field(default_factory=dict)
     _lost: dict[str, str] = dataclasses.field(default_factory=dict)
     _names: set[str] = dataclasses.field(default_factory=set)
 
     def of(self, paint: Paint) -> NDArray[np.uint8] | None:
-        """The picture of a material with its opacity, [height, width, 4], or None."""
-        color = self._decoded(paint.picture)
+        """The image of a material with its opacity, [height, width, 4], or None."""
+        color = self._decoded(paint.image)
         mask = self._decoded(paint.opacity)
         if mask is None:
             return color
@@ -72,42 +72,42 @@ class Pictures:
         return np.dstack([color[..., :3], np.asarray(brightness)])
 
     def gloss(self, paint: Paint) -> tuple[float, float]:
-        """Mean factors of metallic and roughness of a material's picture."""
+        """Mean factors of metallic and roughness of a material's image."""
         pixels = self._decoded(paint.gloss)
         if pixels is None:
             return 1.0, 1.0
         _, roughness, metallic, _ = pixels.mean(axis=(0, 1)) / 255
         return float(metallic), float(roughness)
 
-    def _decoded(self, picture: Picture | None) -> NDArray[np.uint8] | None:
-        if picture is None:
+    def _decoded(self, image: ImageSource | None) -> NDArray[np.uint8] | None:
+        if image is None:
             return None
-        self._names.add(picture.name)
-        if picture not in self._pixels:
+        self._names.add(image.name)
+        if image not in self._pixels:
             try:
-                self._pixels[picture] = picture_pixels(picture)
+                self._pixels[image] = image_pixels(image)
             except SceneError as error:
-                self._pixels[picture] = None
-                self._lost[picture.name] = str(error)
-        return self._pixels[picture]
+                self._pixels[image] = None
+                self._lost[image.name] = str(error)
+        return self._pixels[image]
 
     def notes(self) -> tuple[str, ...]:
-        """One line on the pictures that are lost, if there are any."""
+        """One line on the images that are lost, if there are any."""
         if not self._lost:
             return ()
         reasons = list(self._lost.values())
         more = ", ..." if len(reasons) > _MOST_NAMES else ""
         said = ", ".join(reasons[:_MOST_NAMES]) + more
         count = len(self._names)
-        noun = "picture" if count == 1 else "pictures"
+        noun = "image" if count == 1 else "images"
         verb = "is" if len(reasons) == 1 else "are"
         return (f"{len(reasons)} of {count} {noun} {verb} not shown: {said}",)
 
 
-def with_holes_or_opaque(looks: Looks, pictures: Pictures) -> tuple[Looks, tuple[str, ...]]:
+def with_holes_or_opaque(looks: Looks, images: MaterialImages) -> tuple[Looks, tuple[str, ...]]:
     """Looks without half-transparent materials, and one line on them, if there were any.
 
-    A material whose picture is opaque in parts and clear in others becomes a mask; others become
+    A material whose image is opaque in parts and clear in others becomes a mask; others become
     opaque.
     """
     paints = []
@@ -115,14 +115,14 @@ def with_holes_or_opaque(looks: Looks, pictures: Pictures) -> tuple[Looks, tuple
     used = set(np.unique(looks.paint).tolist())
     for number, paint in enumerate(looks.paints):
         if paint.alpha == BLEND and number in used:
-            picture = pictures.of(paint)
+            image = images.of(paint)
             # half of the opacity of the whole divides the clear parts from the others
-            holes = picture is not None and picture[..., 3].min() < 128 <= picture[..., 3].max()
+            holes = image is not None and image[..., 3].min() < 128 <= image[..., 3].max()
             whole = not holes and paint.color[3] >= 1
             if whole and looks.colors is not None:
                 whole = bool((looks.colors[looks.paint == number, :, 3] == 1).all())
-            if whole and picture is not None:
-                whole = bool(picture[..., 3].min() == 255)
+            if whole and image is not None:
+                whole = bool(image[..., 3].min() == 255)
             changed += not whole
             opaque = (*paint.color[:3], 1.0)
             paint = dataclasses.replace(
