@@ -128,7 +128,8 @@ def _wrap(document: Document, texture_info: dict[str, Any] | None) -> tuple[str,
     if "sampler" not in texture:
         return REPEAT, REPEAT
     sampler = document.entry("samplers", texture["sampler"])
-    return _WRAPS.get(sampler.get("wrapS"), REPEAT), _WRAPS.get(sampler.get("wrapT"), REPEAT)
+    along_u, along_v = (_WRAPS.get(sampler.get(name, 0), REPEAT) for name in ("wrapS", "wrapT"))
+    return along_u, along_v
 
 
 def _coordinates(texture_info: dict[str, Any] | None) -> tuple[int, NDArray[np.float64]]:

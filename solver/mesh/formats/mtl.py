@@ -279,7 +279,8 @@ def _pair(numbers: list[float], otherwise: float) -> tuple[float, float]:
 
 
 def _first_number(text: str) -> float | None:
-    return (_leading_numbers(text.split(), 1) or [None])[0]
+    numbers = _leading_numbers(text.split(), 1)
+    return numbers[0] if numbers else None
 
 
 def _leading_numbers(words: list[str], most: int) -> list[float]:

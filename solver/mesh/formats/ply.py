@@ -190,7 +190,7 @@ def read_ply(path: Path) -> Soup:
     if any(name not in vertex for name in "xyz"):
         raise MeshError("it has no vertices with x, y and z")
     V = np.stack([np.asarray(_flat(vertex[name]), dtype=np.float64) for name in "xyz"], axis=1)
-    polygons = next((faces[name] for name in _CORNER_NAMES if name in faces), [])
+    polygons: Any = next((faces[name] for name in _CORNER_NAMES if name in faces), [])
     if "tristrips" in columns:
         polygons = _of_strips(columns["tristrips"])
         faces = {}
