@@ -280,7 +280,7 @@ class Mesh:
 
 
 def _side_by_side(count: int, *data: NDArray[np.float64] | None) -> NDArray[np.float64]:
-    """Data of the corners of `count` triangles, [count, 3, k each], as one array; None is left out."""
+    """Data of the corners of triangles, [count, 3, k each], as one array; None is left out."""
     return np.concatenate(
         [np.empty((count, 3, 0)), *(each for each in data if each is not None)], 2
     )

@@ -84,7 +84,8 @@ def read_other(path: Path) -> Soup:
     if ending[1:] not in trimesh.available_formats() or ending[1:] in _ARCHIVES:
         raise MeshError(
             f"mesh file {str(path)!r} has an unknown ending: mesh files must end in .obj, .off, "
-            f".ply, .stl, .glb or .gltf, unpacked, or with {_INSTALL} in {', '.join(ASSIMP_ENDINGS)}"
+            f".ply, .stl, .glb or .gltf, unpacked, or with {_INSTALL} in "
+            f"{', '.join(ASSIMP_ENDINGS)}"
         )
     with path.open("rb"), warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -62,8 +62,8 @@ def test_image_are_found_under_the_names_that_programs_write(
 
 
 def test_options_scale_move_and_clamp_the_image_and_colours_multiply_it(tmp_path: Path) -> None:
-    mtl = "newmtl m\nKd 0.5 0.5 1\nmap_Kd -s 3 2 -o 0.5 0.25 0 -clamp on a.png\nmap_d b.png\nKe 1 0 0\n"
-    mesh = square(tmp_path, mtl + "norm n.png\nPm 0.5\nPr 0.75\n")
+    mtl = "newmtl m\nKd 0.5 0.5 1\nmap_Kd -s 3 2 -o 0.5 0.25 0 -clamp on a.png\nmap_d b.png\n"
+    mesh = square(tmp_path, mtl + "Ke 1 0 0\nnorm n.png\nPm 0.5\nPr 0.75\n")
     (paint,) = mesh.looks.paints
     uv = mesh.V[mesh.F][..., :2] * [3, 2] + [0.5, 0.25]
     np.testing.assert_allclose(mesh.corner_uv, uv)
