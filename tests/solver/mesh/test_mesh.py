@@ -60,7 +60,7 @@ def test_the_normal_of_a_spike_points_outwards_of_the_one_triangle_that_faces_el
     ("damage", "name"),
     [
         (lambda V, F: (np.where(np.arange(8)[:, None] == 2, np.nan, V), F), "NaN"),
-        (lambda V, F: (V, F + 1), "indices run from"),
+        (lambda V, F: (V, F + 1), "indices must be 0 to 7, got"),
         (lambda V, F: (V, F[:1, [0, 1, 1]]), "no triangle with an area"),
         (lambda V, F: (V * [1, 0, 0], F), "no triangle with an area"),
         (lambda V, F: (V * 1e15, F), "size must be .*, got 1e"),
