@@ -15,6 +15,7 @@ from ripple_sim.solver.errors import shown
 
 # Written out, since the modules that have these names take seconds to import; a test compares them.
 UP_AXES = ("y", "z")
+VIEWS = ("front", "left", "back", "right", "top")
 RIMS = ("free", "supported", "clamped", "fixed")
 LAYOUTS = ("auto", "cube", "patches")
 BASELINES = ("paper", "uncorrected", "dynamic-paint")
@@ -81,6 +82,11 @@ parse_angle = _reader(
 parse_diameter = _reader(
     float, lambda metres: 0 <= metres < math.inf, "a number of metres, 0 or more, such as 0.02"
 )
+parse_elevation = _reader(
+    float,
+    lambda degrees: -90 <= degrees <= 90,
+    "an elevation from -90, straight down, to 90 degrees, such as -30",
+)
 parse_supersample = _reader(_whole, lambda number: 1 <= number <= 4, "1, 2, 3 or 4")
 parse_shard = _reader(
     _part, lambda part: 1 <= part[0] <= part[1], "a part of how many, such as 1/4, 2/4, 3/4 or 4/4"
@@ -105,6 +111,34 @@ def parse_height_colors(word: str) -> float | str:
         float, lambda metres: 0 < metres < math.inf, "auto, or a positive number of metres"
     )
     return read(word)
+
+
+def parse_view(word: str) -> float | str:
+    """Read the name of a view, or an azimuth [degrees]."""
+    if word in VIEWS:
+        return word
+    with contextlib.suppress(ValueError):
+        azimuth = float(word)
+        if math.isfinite(azimuth):
+            return azimuth
+    raise ValueError(
+        f"it must be {', '.join(VIEWS)}, or an azimuth in degrees, such as 120, got {shown(word)}"
+    )
+
+
+def parse_color(word: str) -> tuple[float, float, float]:
+    """Read a colour, such as "#ff8800" or "1,0.5,0", as sRGB from 0 to 1."""
+    code = re.fullmatch(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", word)
+    if code is not None:
+        red, green, blue = (int(channel, 16) / 255 for channel in code.groups())
+        return red, green, blue
+    with contextlib.suppress(ValueError):
+        red, green, blue = (float(channel) for channel in word.split(","))
+        if all(0 <= channel <= 1 for channel in (red, green, blue)):
+            return red, green, blue
+    raise ValueError(
+        f"it must be three numbers from 0 to 1, such as 0.9,0.5,0.1, or #RRGGBB, got {shown(word)}"
+    )
 
 
 def parse_overlay(word: str) -> tuple[str, ...]:
@@ -196,6 +230,26 @@ Device = Annotated[
     int | None,
     _one_word(parse_seed, "N"),
     arg(help_behavior_hint="(default: the first that works)"),
+]
+View = Annotated[
+    float | str | None,
+    _one_word(parse_view, "{" + ",".join(VIEWS) + ",DEGREES}"),
+    arg(help_behavior_hint="(default: one that shows the front and where bodies land)"),
+]
+Elevation = Annotated[
+    float | None,
+    _one_word(parse_elevation, "DEGREES"),
+    arg(help_behavior_hint="(default: the steeper, the flatter the mesh)"),
+]
+RGB = Annotated[
+    tuple[float, float, float] | None,
+    _one_word(parse_color, "R,G,B|#RRGGBB"),
+    arg(help_behavior_hint="(default: the mesh's, or the look's)"),
+]
+Shapes = Annotated[
+    tuple[str, ...] | None,
+    _one_word(parse_overlay, "NAME[,NAME ...]", lambda words: ",".join(words or ())),
+    arg(help_behavior_hint="(default: all)"),
 ]
 UpAxis = Annotated[
     str | None,

@@ -315,8 +315,19 @@ class DropCommand(_VideoCommand):
     seed: arguments.Seed = 0
     """Seed of the places and sizes of the bodies. The same seed gives the same video."""
     up: arguments.UpAxis = None
-    """Axis of the mesh that points up. By default a flat sheet lies down, and an unstable mesh is
+    """Axis of the mesh that points up. By default a thin sheet lies down, and an unstable mesh is
     turned upright."""
+    view: arguments.View = None
+    """Where the camera stands, half-way through its turn of 5 degrees a second: on a side of the
+    mesh, above it, or at an azimuth as in MuJoCo, 90 for the front."""
+    elevation: arguments.Elevation = None
+    """Elevation of the camera. Negative looks down."""
+    look: Annotated[str, arg(metavar="NAME")] = "rubber"
+    """What the mesh looks made of: rubber, jelly, skin, clay, metal, water or model."""
+    color: arguments.RGB = None
+    """Colour of the mesh (sRGB), in place of its texture and the colours of its vertices."""
+    shapes: arguments.Shapes = None
+    """Shapes of the bodies in turn: ball, box, capsule, ellipsoid, cylinder. Example: ball,box."""
     texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Image for the texture coordinates of the mesh. By default the image that the file names, or
     NAME_texture.png."""
@@ -341,6 +352,11 @@ class DropCommand(_VideoCommand):
             bodies=self.bodies,
             seed=self.seed,
             up=self.up,
+            view=self.view,
+            elevation=self.elevation,
+            look=self.look,
+            color=self.color,
+            shapes=self.shapes,
             texture=self.texture,
             repair=self.repair,
             wrap=self.wrap,
@@ -372,7 +388,7 @@ class ViewCommand:
     seed: arguments.Seed = 0
     """Seed of the places and sizes of the bodies."""
     up: arguments.UpAxis = None
-    """Axis of the mesh that points up. By default a flat sheet lies down, and an unstable mesh is
+    """Axis of the mesh that points up. By default a thin sheet lies down, and an unstable mesh is
     turned upright."""
     repair: bool = False
     """Close the holes of the mesh (needs the package pymeshfix)."""

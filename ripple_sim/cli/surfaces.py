@@ -135,7 +135,7 @@ class AtlasCommand:
 
     def _plot(self, path: Path, atlas: Atlas, thickness: NDArray[np.float64] | None) -> None:
         from ripple_sim.figures.atlas_plot import plot_atlas, plot_thickness
-        from ripple_sim.scene.drop import usual_up
+        from ripple_sim.scene.standing import usual_up
 
         mesh = atlas.mesh
         up = self.up or usual_up(self.mesh)
@@ -298,7 +298,7 @@ class ModesCommand:
 
     def _plot(self, path: Path, atlas: Atlas, found: Modes) -> None:
         from ripple_sim.figures.mode_plot import plot_modes
-        from ripple_sim.scene.drop import usual_up
+        from ripple_sim.scene.standing import usual_up
 
         size = " x ".join(f"{metres:.3g}" for metres in np.ptp(atlas.mesh.V, axis=0))
         rim = "" if atlas.mesh.closed else f", {self.rim} rim"

@@ -15,6 +15,7 @@ from ripple_sim.solver.kernel import Bools, Floats, Ints
 from .geoms import rotation_in_body
 from .ids import FlexId, GeomId
 from .model import CoupledModel
+from .target_warnings import CLOSED_ADVICE
 
 # Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push
 # sideways: geoms that hit an edge or a corner push at down to 0.5.
@@ -171,11 +172,14 @@ class FlexContacts:
             self._warned.add(target)
             name = self._names[target]
             share = self._amounts[target, 1] / self._amounts[target, 0]
+            other_route = f'make_collidable(spec, {name!r}, "sdf")'
+            if self._is_sheet[target]:
+                other_route = CLOSED_ADVICE
             warn_caller(
                 f"the impulses on geom {name!r} are wrong by about {share:.1%}: MuJoCo pushes "
                 "sideways what touches its flex, where a geom has sunk in or edges and corners "
                 "meet; use a shorter time step, no override of contact margins, or "
-                f'make_collidable(spec, {name!r}, "sdf")'
+                f"{other_route}"
             )
 
 

@@ -23,6 +23,9 @@ from .target_mesh import mesh_arrays, primitive_triangles
 
 _GEOM = mujoco.mjtGeom
 
+# What an open mesh may be replaced by, since only a closed one collides as a signed distance.
+CLOSED_ADVICE = "a closed mesh (repair=True of load_mesh, --repair of the command)"
+
 # Points of the rippling surface at which its distance is taken, at most.
 _GAP_POINTS = 1500
 
@@ -114,7 +117,7 @@ def collision_warnings(coupled: CoupledModel, geom: GeomId, atlas: Atlas) -> Ite
     elif geom in coupled.convex_colliders or any(solid != geom for solid in solids):
         yield from _collider_warning(coupled, geom, atlas)
     elif coupled.has_flex[geom]:
-        yield from _flex_warning(coupled, geom)
+        yield from _flex_warning(coupled, geom, atlas)
     elif model.geom_type[geom] == _GEOM.mjGEOM_MESH and collides:
         yield from _hull_warning(coupled, geom, atlas)
     elif model.geom_type[geom] == _GEOM.mjGEOM_SDF:
@@ -205,7 +208,7 @@ def _touch_warning(coupled: CoupledModel, geom: GeomId) -> str:
     )
 
 
-def _flex_warning(coupled: CoupledModel, geom: GeomId) -> Iterator[str]:
+def _flex_warning(coupled: CoupledModel, geom: GeomId, atlas: Atlas) -> Iterator[str]:
     """Warning of geoms that a flex collider meets badly, or not at all."""
     model = coupled.model
     name = coupled.names[geom]
@@ -226,10 +229,12 @@ def _flex_warning(coupled: CoupledModel, geom: GeomId) -> Iterator[str]:
         if names:
             problems.append(reason.format(", ".join(names)))
     if problems:
+        other_route = f'call make_collidable(spec, {name!r}, "sdf")'
+        if not atlas.mesh.closed:
+            other_route = f"take {CLOSED_ADVICE}"
         yield (
-            f"geom {name!r} collides through a flex: {'; '.join(problems)}; call "
-            f'make_collidable(spec, {name!r}, "sdf"), or choose contype and conaffinity so that '
-            "they do not meet"
+            f"geom {name!r} collides through a flex: {'; '.join(problems)}; {other_route}, or "
+            "choose shapes, contype and conaffinity so that they do not meet"
         )
 
 

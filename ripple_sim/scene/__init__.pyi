@@ -10,13 +10,8 @@ from .camera_entry import (
     CameraKey as CameraKey,
     check_camera as check_camera,
 )
-from .drop import (
-    UP_AXES as UP_AXES,
-    drop_scene as drop_scene,
-    find_scene as find_scene,
-    is_scene as is_scene,
-    usual_up as usual_up,
-)
+from .drop import drop_scene as drop_scene, find_scene as find_scene, is_scene as is_scene
+from .drop_view import VIEWS as VIEWS
 from .events import (
     DropEntry as DropEntry,
     Events as Events,
@@ -70,6 +65,7 @@ from .source import (
     scene_path as scene_path,
     shipped_scenes as shipped_scenes,
 )
+from .standing import UP_AXES as UP_AXES, usual_up as usual_up
 from .target_maps import (
     HeightEntry as HeightEntry,
     InsideEntry as InsideEntry,

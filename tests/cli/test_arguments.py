@@ -7,7 +7,7 @@ import pytest
 
 from ripple_sim.cli import DropCommand, RenderCommand, ViewCommand, arguments, parse
 from ripple_sim.overlay import operators
-from ripple_sim.scene import drop
+from ripple_sim.scene import drop, drop_view
 from ripple_sim.solver.layouts import build
 from ripple_sim.solver.operator import plate_rim
 from ripple_sim.video import VideoOptions
@@ -27,6 +27,11 @@ from ripple_sim.video import VideoOptions
         ("overlay", "height=0.02, contacts ,time", ("height=0.02", "contacts", "time")),
         ("overlay", "", ()),
         ("overlay", "  ", ()),
+        ("view", "left", "left"),
+        ("view", "-40", -40.0),
+        ("elevation", "-90", -90.0),
+        ("color", "#ff0033", (1.0, 0.0, 0.2)),
+        ("color", "1, 0,0.25", (1.0, 0.0, 0.25)),
     ],
 )
 def test_a_word_is_read(parse: str, word: str, value: object) -> None:
@@ -55,6 +60,9 @@ def test_a_word_is_read(parse: str, word: str, value: object) -> None:
         ("diameter", ["-0.01", "inf", "nan", "2mm"], "a number of metres, 0 or more"),
         ("supersample", ["0", "5", "1.0", "11", ""], "1, 2, 3 or 4"),
         ("axis", ["x", "Z", ""], "y or z"),
+        ("view", ["Front", "", "nan", "1e400"], "front, left, back, right, top, or an azimuth"),
+        ("elevation", ["-91", "nan", "steep"], "from -90, straight down, to 90 degrees"),
+        ("color", ["red", "#ff00", "1,1", "1,1,2", "1,1,nan"], "three numbers from 0 to 1"),
     ],
 )
 def test_what_is_not_valid_is_quoted_with_what_would_be(
@@ -69,6 +77,7 @@ def test_what_is_not_valid_is_quoted_with_what_would_be(
 
 def test_names_are_those_of_the_rooms_that_have_them() -> None:
     assert (arguments.UP_AXES, arguments.BASELINES) == (drop.UP_AXES, operators.BASELINES)
+    assert tuple(drop_view.VIEWS) == arguments.VIEWS
     assert (arguments.LAYOUTS, arguments.RIMS) == (build.LAYOUTS, plate_rim.RIMS)
 
 
@@ -93,6 +102,8 @@ WORDS = {
     "layout": ("patches", "patches"),
     "rim": ("fixed", "fixed"),
     "backend": ("cpu", "cpu"),
+    "camera": ("side", "side"),
+    "device": ("1", 1),
     "resume": (None, True),
     "overwrite": (None, True),
 }
@@ -127,11 +138,21 @@ def test_the_commands_have_their_own_arguments() -> None:
             "7",
             "--up",
             "y",
+            "--view",
+            "-40",
+            "--elevation",
+            "-30",
+            "--color",
+            "#ffffff",
+            "--shapes",
+            "ball,box",
             "--repair",
             "--wrap",
         ]
     )
     assert (drop.mesh, drop.bodies, drop.seed, drop.up) == (Path("m.obj"), 3, 7, "y")
+    assert (drop.view, drop.elevation, drop.color) == (-40.0, -30.0, (1.0, 1.0, 1.0))
+    assert (drop.shapes, drop.look) == (("ball", "box"), "rubber")
     assert drop.repair and drop.wrap
     render = parse(["render", "duck", "--output", "a.mp4", "--camera", "side", "--device", "1"])
     assert (render.scene, render.camera, render.device) == ("duck", "side", 1)

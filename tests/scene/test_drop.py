@@ -84,6 +84,13 @@ def test_an_edit_changes_the_model_and_mujocos_refusal_of_it_is_named(tmp_path) 
         ({"bodies": -1}, "number of bodies must be 0 to 100, got -1"),
         ({"bodies": 101}, "number of bodies must be .*, got 101"),
         ({"up": "x"}, "up axis must be 'y' or 'z', got 'x'"),
+        ({"view": "side"}, "view must be front, left, back, right, top, or an .* got 'side'"),
+        ({"view": np.nan}, "view must be front, .* got nan"),
+        ({"elevation": 91}, "elevation must be a number from -90, .*, got 91"),
+        ({"shapes": ["egg"]}, "shape must be ball, sphere, box, .* got 'egg'"),
+        ({"shapes": []}, "no shape is given"),
+        ({"look": "gold"}, "look must be .*rubber.*gold"),
+        ({"color": (2, 0, 0)}, "three numbers from 0 to 1"),
     ],
 )
 def test_invalid_options_are_named(tmp_path, options: dict, message: str) -> None:
@@ -113,6 +120,103 @@ def test_a_sheet_of_one_triangle_or_of_two_lies_down_above_the_floor(tmp_path, m
     np.testing.assert_allclose(
         np.linalg.norm(np.cross(*np.diff(corners, axis=1).swapaxes(0, 1)), axis=1), 1, atol=1e-6
     )
+
+
+def surface(name: str) -> trimesh.Trimesh:
+    """A surface 1.0 long, 0.8 wide and 0.3 high or less, along x, y and z."""
+    if name == "pipe":
+        pipe = trimesh.creation.cylinder(0.15, 1.0, sections=12)
+        pipe.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
+        sides = np.abs(pipe.face_normals[:, 0]) < 0.5
+        return trimesh.Trimesh(pipe.vertices, pipe.faces[sides])
+    if name == "slab":
+        return trimesh.creation.box((1.0, 0.8, 0.1))
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 9), np.linspace(-0.4, 0.4, 9))
+    V = np.stack([x, y, 0.14 * np.sin(6 * x) * np.cos(5 * y)], axis=-1).reshape(-1, 3)
+    first = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    F = np.concatenate([first[:, None] + [0, 1, 10], first[:, None] + [0, 10, 9]])
+    cloth = trimesh.Trimesh(V, F)
+    if name == "two cloths":
+        return trimesh.util.concatenate([cloth, cloth.copy().apply_translation([0, 0, 1e-3])])
+    return cloth
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2])
+def test_an_open_sheet_lies_down_whatever_its_axis_and_a_note_says_how_to_stand_it(
+    tmp_path, turn: int
+) -> None:
+    cloth = surface("cloth")
+    cloth.vertices = np.roll(cloth.vertices, turn, axis=1)
+    cloth.export(tmp_path / "cloth.obj")
+    scene = drop_scene(tmp_path / "cloth.obj", bodies=0)
+    assert np.ptp(vertices(scene), axis=0)[2] < 0.3
+    # files other than STL stand on their y axis, which is the thin one after two turns
+    lies_as_usual = turn == 2
+    assert [note for note in scene.notes if "lies down" in note and "--up y" in note] == (
+        [] if lies_as_usual else [scene.notes[-1]]
+    )
+    if not lies_as_usual:
+        standing = drop_scene(tmp_path / "cloth.obj", bodies=0, up="y")
+        assert np.ptp(vertices(standing), axis=0)[2] > 0.75
+        assert not any("lies down" in note for note in standing.notes)
+
+
+@pytest.mark.parametrize("name", ["pipe", "slab", "two cloths"])
+def test_what_is_closed_in_several_parts_or_has_no_thin_side_is_no_sheet(
+    tmp_path, name: str
+) -> None:
+    surface(name).export(tmp_path / "a.obj")
+    scene = drop_scene(tmp_path / "a.obj", bodies=0)
+    assert not any("lies down" in note for note in scene.notes)
+
+
+def boxes(*bounds: list) -> trimesh.Trimesh:
+    return trimesh.util.concatenate([trimesh.creation.box(bounds=each) for each in bounds])
+
+
+def middle_azimuth(scene: Scene) -> float:
+    """Of the camera, half-way of its orbit [degrees]."""
+    return scene.camera.azimuth + scene.camera.orbit * scene.duration / 2
+
+
+def test_the_camera_sees_letters_from_the_front_upright_or_lying(tmp_path) -> None:
+    letter = boxes([[0, 0, 0], [2, 10, 3]], [[0, 8, 0], [6, 10, 3]], [[0, 4, 0], [5, 6, 3]])
+    letter.export(tmp_path / "F.obj")  # upright, its front towards +z
+    letter.export(tmp_path / "F.stl")  # lying, its top towards +y
+    for name in ("F.obj", "F.stl"):
+        scene = drop_scene(tmp_path / name, bodies=0)
+        assert 45 < middle_azimuth(scene) < 135  # along +y, give or take
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_the_camera_sees_where_bodies_land_beside_a_wall(tmp_path, side: int) -> None:
+    wall = [[92 * side, 0, 0], [92 * side + 8, 60, 80]]
+    boxes([[0, 0, 0], [100, 60, 8]], wall).export(tmp_path / "bracket.stl")
+    scene = drop_scene(tmp_path / "bracket.stl", bodies=0)
+    forward = np.cos(np.radians(middle_azimuth(scene)))
+    assert forward * (2 * side - 1) > 0.3  # against the wall
+
+
+def test_the_camera_sees_a_round_head_even_at_the_back(tmp_path) -> None:
+    trunk = trimesh.creation.icosphere(2, 0.25).apply_scale([1, 1.6, 0.8])
+    head = trimesh.creation.icosphere(2, 0.13).apply_translation([0, 0.45, 0.3])
+    trimesh.util.concatenate([trunk, head]).export(tmp_path / "animal.stl")
+    scene = drop_scene(tmp_path / "animal.stl", bodies=0)
+    assert np.sin(np.radians(middle_azimuth(scene))) < 0
+
+
+def test_view_elevation_color_and_shapes_are_used(tmp_path) -> None:
+    path = cone(tmp_path, "a.stl")
+    for view, azimuth in (("front", 90), ("left", 0), ("back", 270), ("right", 180), (33, 33)):
+        scene = drop_scene(path, bodies=0, view=view, elevation=-12)
+        assert middle_azimuth(scene) == pytest.approx(azimuth)
+        assert scene.camera.elevation == -12
+    top = drop_scene(path, bodies=3, view="top", color=(0.1, 0.2, 0.3), shapes=["ball", "box"])
+    assert (top.camera.elevation, top.camera.orbit) == (-90, 0)
+    assert top.targets[0].color == (0.1, 0.2, 0.3)
+    kinds = [int(top.model.geom(f"body_{i}").type[0]) for i in range(3)]
+    sphere, box = (int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_BOX))
+    assert kinds == [sphere, box, sphere]
 
 
 def test_bodies_drop_on_the_edge_of_an_upright_sheet_that_is_not_seen_from_above(tmp_path) -> None:
