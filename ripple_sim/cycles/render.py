@@ -36,12 +36,12 @@ from ripple_sim.export.source import Source
 from ripple_sim.export.visuals import mean_color
 from ripple_sim.render.passes.floor import find_floor
 from ripple_sim.render.tone_mapping import tone_mapped
-from ripple_sim.render.visuals.lights import (
+from ripple_sim.render.visuals.scene_light import lighting_of
+from ripple_sim.render.visuals.studio import (
     BESIDE_LIGHTS,
     FADE,
     SOFT_BOX_LIGHTS,
     STUDIO_FADE,
-    lighting_of,
     sky_colors,
 )
 from ripple_sim.render.visuals.texture_mapping import mapping_of

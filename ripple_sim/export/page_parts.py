@@ -13,7 +13,8 @@ from PIL import Image
 
 from ripple_sim.coupling.ids import GeomId, is_geom
 from ripple_sim.render.surfaces.vertices import memory_order
-from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS, lighting_of
+from ripple_sim.render.visuals.scene_light import lighting_of
+from ripple_sim.render.visuals.studio import SOFT_BOX_LIGHTS
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual, texture_pixels
 

@@ -26,7 +26,7 @@ from ripple_sim.render.mujoco_cameras import (
     set_scene_camera,
     with_camera_poses,
 )
-from ripple_sim.render.visuals.lights import in_studio
+from ripple_sim.render.visuals.scene_light import in_studio
 from ripple_sim.render.visuals.surroundings import followed_flags
 from ripple_sim.scene.camera_entry import CameraEntry
 from ripple_sim.solver.errors import GLError, checked, instance, warn_caller, whole

@@ -14,7 +14,8 @@ from PIL import Image
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 
 from ripple_sim.encode.replace import png_mark
-from ripple_sim.render.visuals.lights import Lighting, lighting_of
+from ripple_sim.render.visuals.lights import Lighting
+from ripple_sim.render.visuals.scene_light import lighting_of
 from ripple_sim.render.visuals.visual import texture_pixels
 
 from .source import Source

@@ -60,5 +60,5 @@ from .tone_mapping import (
     srgb_to_linear as srgb_to_linear,
     tone_mapped as tone_mapped,
 )
-from .visuals.lights import LIGHTING as LIGHTING
+from .visuals.scene_light import LIGHTING as LIGHTING
 from .visuals.visual import LOOKS as LOOKS

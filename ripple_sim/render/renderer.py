@@ -20,8 +20,8 @@ from ripple_sim.render.passes.floor import Floor, find_floor
 from ripple_sim.render.passes.floor_occlusion import FloorOcclusion
 from ripple_sim.render.passes.shadows import ShadowMaps, TransmissionMaps
 from ripple_sim.render.surfaces.surface import Surface
-from ripple_sim.render.visuals.lights import SceneLight, in_studio
 from ripple_sim.render.visuals.objects import Assets
+from ripple_sim.render.visuals.scene_light import SceneLight, in_studio
 from ripple_sim.render.visuals.surroundings import RenderFlags
 from ripple_sim.solver.errors import RippleError, warn_caller
 from ripple_sim.solver.gl import GLContext

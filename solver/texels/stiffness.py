@@ -17,8 +17,9 @@ from typing import TypeAlias
 import numpy as np
 
 from ..kernel import Floats, Floats32, Ints
-from .cells import LINKS, at_corners, conductance, quad, quad_area, special_cells
+from .cells import conductance, quad, quad_area
 from .quad_pass import LEAST_RATIO, QuadCells, quad_pass
+from .special_cells import LINKS, at_corners, special_cells
 from .stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from .topology import TexelTopology
 

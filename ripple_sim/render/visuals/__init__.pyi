@@ -15,24 +15,24 @@ from .geoms import (
     shaped as shaped,
     visuals_of as visuals_of,
 )
-from .lights import (
-    BESIDE_LIGHTS as BESIDE_LIGHTS,
-    FADE as FADE,
+from .lights import Light as Light, Lighting as Lighting, model_lighting as model_lighting
+from .objects import Assets as Assets, ObjectTable as ObjectTable, Occluders as Occluders
+from .scene_entries import visuals_in as visuals_in
+from .scene_light import (
     LIGHTING as LIGHTING,
-    SOFT_BOX_LIGHTS as SOFT_BOX_LIGHTS,
-    STUDIO_FADE as STUDIO_FADE,
-    Light as Light,
-    Lighting as Lighting,
     SceneLight as SceneLight,
     lighting_of as lighting_of,
-    model_lighting as model_lighting,
     set_lighting as set_lighting,
+)
+from .shapes import shape_of as shape_of, sizes as sizes
+from .studio import (
+    BESIDE_LIGHTS as BESIDE_LIGHTS,
+    FADE as FADE,
+    SOFT_BOX_LIGHTS as SOFT_BOX_LIGHTS,
+    STUDIO_FADE as STUDIO_FADE,
     sky_colors as sky_colors,
     studio_lighting as studio_lighting,
 )
-from .objects import Assets as Assets, ObjectTable as ObjectTable, Occluders as Occluders
-from .scene_entries import visuals_in as visuals_in
-from .shapes import shape_of as shape_of, sizes as sizes
 from .texture_mapping import TextureMapping as TextureMapping, mapping_of as mapping_of
 from .visual import (
     LOOKS as LOOKS,
