@@ -16,7 +16,8 @@ from typing import Any
 
 import msgspec
 
-from ripple_sim.batch.plan import Distribution, MeshesEntry, PlanFile, StoreEntry
+from ripple_sim.batch.distribution import Distribution
+from ripple_sim.batch.plan import MeshesEntry, PlanFile, StoreEntry
 from ripple_sim.render import LIGHTING, LOOKS
 from ripple_sim.scene import scene_file
 from ripple_sim.scene.bodies import BODY_SHAPES

@@ -1,12 +1,9 @@
+from .distribution import Distribution as Distribution
 from .executors import DaskExecutor as DaskExecutor
 from .finished import pack as pack
 from .folder import BatchFolder as BatchFolder, keep_plan as keep_plan, stored as stored
-from .plan import (
-    Distribution as Distribution,
-    Plan as Plan,
-    parse_key as parse_key,
-    read_plan as read_plan,
-)
+from .keys import parse_key as parse_key
+from .plan import Plan as Plan, read_plan as read_plan
 from .report import load_batch as load_batch, parquet as parquet, status_text as status_text
 from .run import (
     Progress as Progress,

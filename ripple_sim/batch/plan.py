@@ -1,24 +1,17 @@
-"""The TOML file of a batch: varied values, their distributions, and the stored outputs.
-
-Keys of a plan are such as `camera.azimuth`, `ripple[duck].material.speed`, `geom[ball*].size[0]`.
-"""
+"""The TOML file of a batch: which scenes, what varies, and what is stored."""
 
 from __future__ import annotations
 
 import dataclasses
 import glob
 import importlib.util
-import math
 import os
-import re
 import tempfile
-from collections.abc import Iterator, Sequence
-from fnmatch import fnmatchcase
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
-import numpy as np
 import trimesh
 
 from ripple_sim.errors import SceneError
@@ -28,189 +21,11 @@ from ripple_sim.solver.errors import shown
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.settings import check_options
 
-Numbers = float | list[float]
-
-# The kinds of distributions. A distribution has exactly one of them.
-KINDS = ("uniform", "log_uniform", "normal", "integers", "choice", "orientation", "constant")
-
-# Normal numbers are drawn at most so many times until they lie within their limits.
-_MAX_DRAWS = 10_000
-
-# One step of a key: a name, perhaps with something in brackets behind it.
-_STEP_PATTERN = r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?"
+from .distribution import KINDS, Distribution
+from .keys import parse_key
 
 # largest `count` of a plan
 MOST_SCENES = 10_000_000
-
-
-class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """A distribution, of exactly one kind.
-
-    The kinds are `uniform`, `log_uniform`, `normal`, `integers`, `choice`, `orientation` and
-    `constant`.
-    """
-
-    uniform: tuple[Numbers, Numbers] | None = None
-    """Lowest and highest number, or vectors of these."""
-    log_uniform: tuple[Numbers, Numbers] | None = None
-    """Likewise, above 0; as many between 1 and 2 as between 2 and 4."""
-    normal: tuple[float, float] | None = None
-    """Mean and standard deviation."""
-    integers: tuple[int, int] | None = None
-    """Lowest and highest whole number, both included."""
-    choice: list[Any] | None = None
-    """Values of any kind."""
-    orientation: bool = False
-    """A turn, all equally likely, as a unit quaternion w, x, y, z."""
-    constant: Any = None
-    """Always this value."""
-    weights: list[float] | None = None
-    """How likely each of the choices is, in any unit; by default all are equally likely."""
-    limits: tuple[float, float] | None = None
-    """Of a normal one: it is drawn again until it lies between them."""
-    length: int | None = None
-    """How many numbers are drawn, independently, for a vector."""
-    apply: Literal["set", "add", "multiply"] = "set"
-    """How the drawn value changes the value in the scene: replace it, add to it, or multiply it."""
-    together: bool = False
-    """Whether a key that fits several places gives them all the same value."""
-
-    def draw(self, rng: np.random.Generator) -> Any:
-        """Draw a value: a float, an int, a list of these, or any of the choices.
-
-        Floats are rounded to 12 digits, so that no processor's last bit counts.
-        """
-        if self.choice is not None:
-            share = (
-                None if self.weights is None else np.divide(self.weights, math.fsum(self.weights))
-            )
-            return self.choice[int(rng.choice(len(self.choice), p=share))]
-        if self.constant is not None:
-            return self.constant
-        if self.orientation:
-            turn = rng.standard_normal(4)
-            return _plain(turn / math.sqrt(math.fsum(turn**2)))
-        if self.integers is not None:
-            whole = rng.integers(
-                self.integers[0], self.integers[1], size=self.length, endpoint=True
-            )
-            return whole.tolist() if self.length else int(whole)
-        if self.uniform is not None:
-            return _plain(rng.uniform(*self.uniform, size=self.length))
-        if self.log_uniform is not None:
-            low, high = (np.log(np.array(end)) for end in self.log_uniform)
-            return _plain(np.exp(rng.uniform(low, high, size=self.length)))
-        mean, deviation = self.normal or (0.0, 0.0)
-        least, greatest = self.limits or (-math.inf, math.inf)
-        number = rng.normal(mean, deviation, size=self.length)
-        for _ in range(_MAX_DRAWS):
-            outside = (number < least) | (number > greatest)
-            if not np.any(outside):
-                return _plain(number)
-            number = np.where(outside, rng.normal(mean, deviation, size=self.length), number)
-        raise SceneError(
-            f"normal {self.normal} hardly ever lies within the limits {self.limits}; widen them"
-        )
-
-    def check(self, key: str) -> None:
-        """Check that there is one kind, and that its numbers are valid.
-
-        Raises `SceneError` with the key.
-        """
-        given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
-        if len(given) != 1:
-            raise SceneError(
-                f"plan: {key} must be drawn from one of {', '.join(KINDS)}, got "
-                f"{' and '.join(given) or 'nothing'}"
-            )
-        kind = given[0]
-        for other, extra, fitting in (
-            ("weights", self.weights, "choice"),
-            ("limits", self.limits, "normal"),
-        ):
-            if extra is not None and kind != fitting:
-                raise SceneError(f"plan: {key} has {other}, which {kind} does not take")
-        if self.length is not None and (self.length < 1 or kind not in KINDS[:4]):
-            raise SceneError(
-                f"plan: the length of {key} must be 1 or more, and its values numbers, got "
-                f"length {self.length}"
-            )
-        problem = self._problem()
-        if problem:
-            raise SceneError(
-                f"plan: {key} is drawn from {kind} = {shown(getattr(self, kind))}; {problem}"
-            )
-
-    def _problem(self) -> str | None:
-        """The rule that the numbers break, in words; None if they break none."""
-        pair = self.uniform or self.log_uniform or self.integers or self.limits
-        if pair is not None:
-            low = np.array(pair[0], float)
-            high = np.array(pair[1], float)
-            if low.shape not in ((), high.shape) and high.shape != ():
-                return "it must be two numbers, or two vectors of the same length"
-            if not (np.isfinite(low).all() and np.isfinite(high).all() and np.all(low <= high)):
-                return "it must be two finite numbers, the lower one first"
-            if self.log_uniform and np.any(low <= 0):
-                return "its numbers must be above 0"
-            if self.length is not None and max(low.size, high.size) > 1:
-                return "vectors have their own length; leave `length` out"
-        if self.normal is not None and not (np.isfinite(self.normal).all() and self.normal[1] >= 0):
-            return "it must be a mean and a standard deviation of 0 or more"
-        if self.choice is not None:
-            if not self.choice:
-                return "it must have at least one value"
-            weights = self.weights
-            if weights is not None and not (
-                len(weights) == len(self.choice)
-                and min(weights) >= 0
-                and 0 < sum(weights) < math.inf
-            ):
-                return f"it must have {len(self.choice)} weights, none below 0"
-        return None
-
-
-def _plain(value: Any) -> Any:
-    """Numbers of numpy as Python's, with 12 digits."""
-    if np.ndim(value):
-        return [float(f"{number:.12g}") for number in value]
-    return float(f"{value:.12g}")
-
-
-# A part of a key: a name, and what stands in brackets behind it: a number, a name, or a pattern
-# with *; "" without.
-Step = tuple[str, str]
-
-
-def parse_key(key: str) -> tuple[Step, ...]:
-    """Read a key of a plan; raises `SceneError` if it is not names between dots."""
-    if not re.fullmatch(rf"{_STEP_PATTERN}(?:\.{_STEP_PATTERN})*", key):
-        raise SceneError(
-            "plan: a key must be names between dots, with a number, a name or a pattern in "
-            "brackets, such as camera.azimuth, ripple[duck].material.speed or geom[ball*].size, "
-            f"got {key!r}"
-        )
-    return tuple(re.findall(_STEP_PATTERN, key))
-
-
-def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
-    """Indices of the items that a step of a key selects by their names; without brackets all.
-
-    Raises `SceneError` if there is none.
-    """
-    kind, chosen = step
-    if not chosen:
-        found = list(range(len(names)))
-    elif chosen.isdecimal() and chosen not in names:
-        found = [int(chosen)] if int(chosen) < len(names) else []
-    else:
-        found = [number for number, name in enumerate(names) if fnmatchcase(name, chosen)]
-    if not found:
-        listed = (
-            ", ".join(name or f"number {number}" for number, name in enumerate(names)) or "none"
-        )
-        raise SceneError(f"plan: {where} has no {kind}[{chosen or '*'}]; there is {listed}")
-    return found
 
 
 class StoreEntry(msgspec.Struct, forbid_unknown_fields=True):

@@ -21,7 +21,9 @@ from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import parse_scene
 from ripple_sim.solver.errors import shown
 
-from .plan import Distribution, MeshesEntry, Plan, Step, choose, parse_key
+from .distribution import Distribution
+from .keys import Step, choose, parse_key
+from .plan import MeshesEntry, Plan
 
 # The stream of random numbers of a key.
 Stream = Callable[[str], np.random.Generator]

@@ -129,12 +129,13 @@ class AtlasCommand:
         if self.output is not None:
             check_atlas_place(self.output, self.overwrite)
         if self.plot is not None:
-            from ripple_sim.figures.atlas_plot import check_plot_path
+            from ripple_sim.figures.figure_file import check_plot_path
 
             check_plot_path(self.plot, self.overwrite)
 
     def _plot(self, path: Path, atlas: Atlas, thickness: NDArray[np.float64] | None) -> None:
-        from ripple_sim.figures.atlas_plot import plot_atlas, plot_thickness
+        from ripple_sim.figures.atlas_plot import plot_atlas
+        from ripple_sim.figures.thickness_plot import plot_thickness
         from ripple_sim.scene.standing import usual_up
 
         mesh = atlas.mesh
@@ -268,7 +269,7 @@ class ModesCommand:
 
         check_mesh_file(self.mesh)
         if self.plot is not None:
-            from ripple_sim.figures.atlas_plot import check_plot_path
+            from ripple_sim.figures.figure_file import check_plot_path
 
             _check_other(self.plot, self.mesh, "the mesh")
             check_plot_path(self.plot, self.overwrite)

@@ -7,18 +7,17 @@ from .clip import (
     Stream as Stream,
     join_clips as join_clips,
 )
-from .gif import join_gif as join_gif
-from .output import (
+from .formats import (
     ENDINGS as ENDINGS,
     FORMATS as FORMATS,
     FRAMES_IN_CLIP as FRAMES_IN_CLIP,
     Format as Format,
     Segments as Segments,
-    check_output as check_output,
-    check_size as check_size,
     default_fps as default_fps,
     video_format as video_format,
 )
+from .gif import join_gif as join_gif
+from .output import check_output as check_output, check_size as check_size
 from .part import STATES as STATES, Part as Part
 from .passes import PassFiles as PassFiles, check_passes as check_passes
 from .replace import (

@@ -23,7 +23,8 @@ from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.files import final_path
 
 from .clip import Stream
-from .output import FORMATS, Format, Segment, check_output, video_format
+from .formats import FORMATS, Format, Segment, video_format
+from .output import check_output
 from .part import Part, Settings
 
 # Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB, or

@@ -12,16 +12,9 @@ from ripple_sim.solver import Atlas, Modes, texel_atlas
 from ripple_sim.solver.mesh.queries import RayScene
 from ripple_sim.solver.texels.halo import sampling_matrix
 
-from .atlas_plot import (
-    STRETCH_COLORS,
-    TEXT,
-    AtlasPainter,
-    View,
-    check_plot_path,
-    dressed,
-    save_plot,
-    show,
-)
+from .atlas_painter import AtlasPainter, View
+from .atlas_plot import STRETCH_COLORS
+from .figure_file import TEXT, check_plot_path, dressed, save_plot, show
 
 # Greatest height of a mode over the radius of a sheet.
 _MAX_SHEET_HEIGHT = 0.3

@@ -20,7 +20,7 @@ import numpy as np
 
 from ripple_sim import __version__
 from ripple_sim.encode import check_output, default_fps
-from ripple_sim.encode.output import video_format
+from ripple_sim.encode.formats import video_format
 from ripple_sim.encode.part import Settings
 from ripple_sim.encode.passes import check_passes
 from ripple_sim.errors import VideoError

@@ -11,13 +11,13 @@ from genus_zero import thin_limb
 from PIL import Image
 
 from ripple_sim.cli import main as cli
-from ripple_sim.figures import atlas_plot
+from ripple_sim.figures import atlas_painter
 
 
 @pytest.fixture
 def coarse_pictures(monkeypatch):
     """Pictures that are not averaged from finer ones, which takes most of their time."""
-    monkeypatch.setattr(atlas_plot, "OVERSAMPLING", 1)
+    monkeypatch.setattr(atlas_painter, "OVERSAMPLING", 1)
 
 
 BALL = trimesh.creation.icosphere(subdivisions=2)

@@ -8,13 +8,13 @@ import pytest
 from PIL import Image
 
 from ripple_sim.cli import main as cli
-from ripple_sim.figures import atlas_plot, mode_plot
+from ripple_sim.figures import atlas_painter, mode_plot
 
 SHEET = "v 0 0 0\nv 0.5 0 0\nv 1 0 0\nv 0 0 1\nv 0.5 0 1\nv 1 0 1\nf 1 4 5 2\nf 2 5 6 3\n"
 
 
 def test_a_sheet_fixed_at_its_rim_is_told_and_drawn(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(atlas_plot, "OVERSAMPLING", 1)
+    monkeypatch.setattr(atlas_painter, "OVERSAMPLING", 1)
     monkeypatch.setattr(mode_plot, "_LARGEST", 64)
     mesh = tmp_path / "sheet.obj"
     plot = tmp_path / "modes.png"

@@ -7,7 +7,7 @@ import pytest
 from hand_made import polygon, square
 
 from ripple_sim.figures import AtlasPainter, View, chart_colors, cross, squares, texel_stretch
-from ripple_sim.figures.atlas_plot import save_plot
+from ripple_sim.figures.figure_file import save_plot
 from ripple_sim.solver import AtlasError, sphere_atlas, texel_atlas
 
 

@@ -18,7 +18,7 @@ from unfinished_videos import interrupting_at
 from ripple_sim.batch import BatchFolder, RunOptions, load_batch, run, run_batch
 from ripple_sim.batch.folder import Failure
 from ripple_sim.cli import main as cli, render
-from ripple_sim.encode.output import FORMATS
+from ripple_sim.encode.formats import FORMATS
 from ripple_sim.errors import RippleError
 from ripple_sim.solver import Atlas, Mesh, build_atlas, load_atlas
 from ripple_sim.solver.cache import cache_folder

@@ -29,7 +29,7 @@ def begin_command(home: Path, words: str, begun: Event) -> None:
     from ripple_sim.batch import run
     from ripple_sim.cli.main import main
     from ripple_sim.cli.signals import end_at_once
-    from ripple_sim.figures import atlas_plot
+    from ripple_sim.figures import atlas_painter
 
     signal.signal(signal.SIGINT, signal.default_int_handler)
     end_at_once()  # as the program does before it imports what is above
@@ -38,6 +38,6 @@ def begin_command(home: Path, words: str, begun: Event) -> None:
     os.dup2(os.open("said", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     run.LocalExecutor = Here  # type: ignore[misc,assignment]
-    atlas_plot.OVERSAMPLING = 1
+    atlas_painter.OVERSAMPLING = 1
     begun.set()
     sys.exit(main(words.split()))
