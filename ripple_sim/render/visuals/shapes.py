@@ -321,11 +321,11 @@ def facing_lines(
     """
     axes = rotations[:, :, 2]
     ends = starts + axes * pixel_sizes[:, 0, 2:]
-    ahead = -pose.rotation[:, 2]
+    forward = -pose.rotation[:, 2]
     ways = pose.ways(starts)
     # directions of the lines in the picture, in the plane of the picture
-    seen = axes * (ways @ ahead)[:, None] - ways * (axes @ ahead)[:, None]
-    across = np.cross(ahead, seen)
+    seen = axes * (ways @ forward)[:, None] - ways * (axes @ forward)[:, None]
+    across = np.cross(forward, seen)
     length = np.linalg.norm(across, axis=1, keepdims=True)
     # a line that is seen along its axis is a point
     across = np.where(length > 0, across / np.maximum(length, 1e-300), rotations[:, :, 0])
