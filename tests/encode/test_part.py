@@ -1,6 +1,7 @@
 """Interrupted videos: what a kill leaves is whole, and they go on to the very same bytes."""
 
 import fcntl
+import json
 import os
 import random
 import shutil
@@ -14,6 +15,7 @@ import av
 import numpy as np
 import pytest
 from PIL import Image
+from programs import PROGRAMS
 from unfinished_videos import contents, written_until_full
 
 from ripple_sim.encode import FRAMES_IN_CLIP, FrameWriter, open_writer
@@ -25,31 +27,21 @@ SIZE = (64, 48)
 FPS = 25
 SETTINGS = {"the scene": "a moving square"}
 DIGEST = "0123456789abcdef" * 2
-# Writes all the videos one behind the other, and goes on with those that are not whole.
-PROGRAM = f"""
-import sys, time
-from pathlib import Path
-import numpy as np
-from ripple_sim.encode import open_writer
-print("ready", flush=True)
-for ending in {ENDINGS!r}:
-    path = Path(sys.argv[1]) / f"clip{{ending}}"
-    if path.exists() and not path.with_name(path.name + ".part").exists():
-        continue
-    with open_writer(
-        path, width={SIZE[0]}, height={SIZE[1]}, fps={FPS}, settings={SETTINGS!r}, resume=True
-    ) as writer:
-        for number in range(writer.frames, {FRAMES}):
-            frame = np.full(({SIZE[1]}, {SIZE[0]}, 3), 60, np.uint8)
-            frame[10:30, number % 40 : number % 40 + 20] = (230, 180, number)
-            writer.write(frame)
-            time.sleep(0.001)
-"""
+PROGRAM_SETTINGS = {
+    "endings": ENDINGS,
+    "frames": FRAMES,
+    "width": SIZE[0],
+    "height": SIZE[1],
+    "fps": FPS,
+    "settings": SETTINGS,
+}
 
 
 def start(folder: Path) -> subprocess.Popen:
     process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, folder], stdout=subprocess.PIPE, text=True
+        [sys.executable, PROGRAMS / "write_clips.py", folder, json.dumps(PROGRAM_SETTINGS)],
+        stdout=subprocess.PIPE,
+        text=True,
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from mujoco_models import forwarded
+from programs import PROGRAMS
 
 from ripple_sim import Exporter, ExportOptions, Material, RippleError, Ripples, export_scene
 from ripple_sim.cycles import python_with_bpy
@@ -201,29 +202,6 @@ def test_velocities_of_a_scene_are_the_rates_of_its_points(scene: Scene, tmp_pat
 
 SEEN = 7
 SURFACES = ("egg", "jelly")
-# the vertices in the world of every mesh at every frame
-READ = """
-import sys
-import bpy
-import numpy as np
-
-bpy.ops.wm.read_factory_settings(use_empty=True)
-bpy.ops.wm.usd_import(filepath=sys.argv[1])
-scene = bpy.context.scene
-found = {"range": [scene.frame_start, scene.frame_end]}
-for name in sys.argv[4:]:
-    places = []
-    for frame in range(int(sys.argv[3])):
-        scene.frame_set(frame)
-        thing = bpy.data.objects[name].evaluated_get(bpy.context.evaluated_depsgraph_get())
-        mesh = thing.to_mesh()
-        points = np.empty(3 * len(mesh.vertices), np.float32)
-        mesh.vertices.foreach_get("co", points)
-        world = np.array(thing.matrix_world)
-        places.append(points.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3])
-    found[name] = places
-np.savez(sys.argv[2], **found)
-"""
 
 
 @pytest.mark.parametrize("chunk", [None, 3])
@@ -253,8 +231,9 @@ def test_blender_has_our_vertices_at_every_frame(
                     ripples[name].height, ripples[name].velocity, ripples.vertices(name, data)
                 ).points
                 seen[name].append(points @ rotation.T + position if name == "egg" else points)
+    reader = PROGRAMS / "read_usd_in_blender.py"
     arguments = [tmp_path / "run.usdc", tmp_path / "found.npz", SEEN, *SURFACES]
-    subprocess.run([python, "-c", READ, *map(str, arguments)], check=True, capture_output=True)
+    subprocess.run([python, reader, *map(str, arguments)], check=True, capture_output=True)
     with np.load(tmp_path / "found.npz") as found:
         assert found["range"].tolist() == [0, SEEN - 1]
         for name in SURFACES:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from genus_zero import icosphere
-from programs import ended
+from programs import PROGRAMS, ended
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Mesh, RippleError, build_atlas, cache
@@ -117,47 +117,21 @@ def test_a_private_folder_of_somebody_else_is_not_used(tmp_path: Path, monkeypat
     assert folder != planted and folder.stat().st_mode & 0o077 == 0
 
 
-_BEGIN = """
-import os, resource, sys
-import numpy as np
-from ripple_sim.solver import Mesh, build_atlas
-from ripple_sim.solver.cache import cache_path
-V = np.vstack([np.zeros(3), np.eye(3)])
-mesh = Mesh.from_arrays(V, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]))
-expected = build_atlas(mesh, 8, cache=False).positions
-"""
-_FOUR = """
-ready, go = os.pipe()
-for _ in range(4):
-    if os.fork() == 0:
-        os.close(go)
-        os.read(ready, 1)  # until the parent closes its end: all begin at once
-        same = [np.array_equal(build_atlas(mesh, 8).positions, expected) for _ in range(3)]
-        os._exit(0 if all(same) else 1)
-os.close(go)
-sys.exit(any(os.wait()[1] for _ in range(4)))
-"""
-_FULL = """
-resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
-sys.exit(not np.array_equal(build_atlas(mesh, 8).positions, expected))
-"""
-
-
-def run(program: str, home: Path) -> list[str]:
-    """Run a program with a home of its own; return what it leaves there."""
+def fill_cache(mode: str, home: Path) -> list[str]:
+    """Run `fill_cache.py` with a home of its own; return the files that it leaves there."""
     environment = {"XDG_CACHE_HOME": str(home), "PATH": "", "NUMBA_NUM_THREADS": "1"}
-    result = ended("-c", _BEGIN + program, env=environment, timeout=600)
+    result = ended(PROGRAMS / "fill_cache.py", mode, env=environment, timeout=600)
     assert (result.returncode, result.stderr) == (0, "")
     return [each.name for each in home.rglob("*") if each.is_file()]
 
 
 def test_four_processes_fill_one_cache_at_once(tmp_path: Path) -> None:
-    files = run(_FOUR, tmp_path)
+    files = fill_cache("four", tmp_path)
     assert len(files) == 1 and files[0].endswith(".npz")
 
 
 def test_a_full_disk_costs_the_next_call_its_time_and_leaves_nothing(tmp_path: Path) -> None:
-    assert run(_FULL, tmp_path) == []
+    assert fill_cache("full", tmp_path) == []
 
 
 def test_what_is_made_from_an_object_is_made_once_and_kept_while_the_object_lives():

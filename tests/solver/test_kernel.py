@@ -1,7 +1,7 @@
 """Compiled kernels divide as numpy does, without fast-math; messages of compiling."""
 
 import importlib
-import io
+import inspect
 import os
 import sys
 import time
@@ -14,6 +14,7 @@ import numba
 import numpy as np
 import pytest
 from programs import ended
+from waves_on_two_surfaces import heights
 
 from ripple_sim.solver.compile_clock import compile_times, compiling, work_clock
 from ripple_sim.solver.kernel import kernel
@@ -190,42 +191,16 @@ def test_a_kernel_compiled_under_another_setting_is_another_file(
     monkeypatch.undo()
 
 
-WAVES = """
-import io, sys
-import numpy as np
-from hand_made import square
-from ripple_sim.solver import Material, WaveSolver, sphere_atlas, texel_atlas
-
-results = {}
-for name, atlas in {"sphere": sphere_atlas(1.0, 4), "square": texel_atlas(square(4))}.items():
-    plain = Material(speed=1.0)
-    density = 2 + atlas.positions[..., 1]
-    every = Material(
-        speed=1.0, bending=1e-3, viscosity=1e-3, yield_height=1e-3, density=density
-    )
-    for kind, material in {"plain": plain, "every": every}.items():
-        waves = WaveSolver(atlas, material, backend="cpu")
-        waves.add_impulse([0.2, 0.3, 1.0], 0.1, 0.6)
-        waves.add_force([0.2, -0.3, 1.0], 0.1, 0.6)
-        waves.step(0.2)
-        results[f"{name}, {kind}"] = waves.height
-        results[f"{name}, {kind}, dent"] = waves.dent
-"""
-
-
-def test_without_compilation_waves_are_the_same() -> None:
+def test_waves_are_the_same_without_compilation(tmp_path: Path) -> None:
     """NUMBA_DISABLE_JIT: footprints and loops over fields work in plain Python."""
-    compiled: dict[str, dict[str, np.ndarray]] = {"results": {}}
-    exec(WAVES, compiled)
-    save = (
-        "file = io.BytesIO(); np.savez(file, **results); sys.stdout.buffer.write(file.getvalue())"
-    )
+    compiled = heights()
+    program = inspect.getfile(heights)
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
-    done = ended("-c", WAVES + save, env=environment, text=False, check=True)
-    plain = np.load(io.BytesIO(done.stdout))
-    assert set(plain) == set(compiled["results"])
+    ended(program, tmp_path / "plain.npz", env=environment, check=True)
+    plain = np.load(tmp_path / "plain.npz")
+    assert set(plain) == set(compiled)
     assert plain["square, every, dent"].any()
-    for name, expected in compiled["results"].items():
+    for name, expected in compiled.items():
         np.testing.assert_allclose(
             plain[name], expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max(), err_msg=name
         )

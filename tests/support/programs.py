@@ -8,6 +8,8 @@ from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any
 
+PROGRAMS = Path(__file__).parents[1] / "programs"
+
 
 def ended(*words: Any, **options: Any) -> subprocess.CompletedProcess[str]:
     """A Python process with these arguments, after its end; options of `subprocess.run`."""

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from programs import ended
+from programs import PROGRAMS, ended
 from scene_files import write_scene
 
 from ripple_sim.scene import Scene, load_scene
@@ -46,40 +46,12 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-FULL = """
-import json, resource, signal, sys
-import numpy as np
-from ripple_sim.errors import EncodingError
-from ripple_sim.encode import open_writer
-path = sys.argv[1]
-limit, width, height, count = map(int, sys.argv[2:6])
-options = json.loads(sys.argv[6])
-shape = (count, height, width, 3)
-noise = np.random.default_rng(0).integers(0, 31743, shape, np.uint16)
-if options.get("frame_format") == "exr":
-    noise = noise.view(np.float16)
-else:
-    noise = (noise % 256).astype(np.uint8)
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-try:
-    with open_writer(path, width=width, height=height, fps=25, **options) as writer:
-        for frame in noise:
-            writer.write(frame)
-except EncodingError as error:
-    print(error)
-"""
-
-
 def written_until_full(
     path: Path, limit: int, width: int, height: int, count: int, **options: object
 ) -> str:
-    """What is said where so many frames of noise are written, but no file may grow beyond a limit.
-
-    That is what a full disk does, without filling one.
-    """
-    result = ended(
-        "-c", FULL, path, *map(str, (limit, width, height, count)), json.dumps(options), check=True
-    )
+    """The error of a video of noise whose files may not grow beyond a limit, as on a full disk."""
+    numbers = map(str, (limit, width, height, count))
+    program = PROGRAMS / "write_until_full.py"
+    result = ended(program, path, *numbers, json.dumps(options), check=True)
     assert "Traceback" not in result.stderr
     return result.stdout

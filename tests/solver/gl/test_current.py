@@ -7,7 +7,7 @@ from ctypes.util import find_library
 
 import pytest
 from own_context import own_context
-from programs import ended
+from programs import PROGRAMS, ended
 
 from ripple_sim.solver import GLError, Material, WaveSolver, sphere_atlas
 from ripple_sim.solver.gl import GLContext, create_context, current_context, shared_context
@@ -97,46 +97,10 @@ def test_somebody_who_takes_the_context_away_while_it_draws_is_reported(opengl: 
         assert ctx.error == "GL_NO_ERROR"
 
 
-IN_MEMORY = """
-from OpenGL import GL, osmesa
-from OpenGL.arrays import GLfloatArray
-own = osmesa.OSMesaCreateContextExt(osmesa.OSMESA_RGBA, 24, 8, 0, None)
-picture = GLfloatArray.zeros((4, 8, 4))
-assert osmesa.OSMesaMakeCurrent(own, picture, GL.GL_FLOAT, 8, 4)
-"""
-
-WINDOW = """
-import glfw
-from OpenGL import GL
-assert glfw.init()
-glfw.window_hint(glfw.VISIBLE, False)
-own = glfw.create_window(8, 4, "own", None, None)
-glfw.make_context_current(own)
-"""
-
-DRAWING = """
-import numpy as np
-from ripple_sim.solver.gl import shared_context
-
-def color(red):
-    GL.glClearColor(red, 0, 0, 1)
-    GL.glClear(GL.GL_COLOR_BUFFER_BIT)
-    return round(float(np.ravel(GL.glReadPixels(0, 0, 1, 1, GL.GL_RGBA, GL.GL_FLOAT))[0]), 1)
-
-print(color(0.2), GL.glGetString(GL.GL_VERSION).decode())
-gl = shared_context()
-print(color(0.4))
-with gl as ctx:
-    ours = ctx.simple_framebuffer((1, 1))
-    ours.use()
-    ours.clear(0.8)
-    print(round(ours.read()[0] / 255, 1), ctx.info["GL_VERSION"])
-print(color(0.6))
-"""
-
-
-def colors(begin: str, **environment: str) -> list[str]:
-    done = ended("-c", begin + DRAWING, env={**os.environ, **environment}, timeout=120)
+def colors(own: str, **environment: str) -> list[str]:
+    """Red of the pictures of a program with a context of its own, before, beside and after ours."""
+    program = PROGRAMS / "draw_beside_ours.py"
+    done = ended(program, own, env={**os.environ, **environment}, timeout=120)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert "Core" in lines[2] and "Core" not in lines[0]
@@ -148,8 +112,8 @@ def colors(begin: str, **environment: str) -> list[str]:
     reason="needs OSMesa (on Debian and Ubuntu: apt-get install libosmesa6)",
 )
 def test_a_program_that_draws_into_memory_keeps_its_context(opengl: None) -> None:
-    assert colors(IN_MEMORY, PYOPENGL_PLATFORM="osmesa") == ["0.2", "0.4", "0.8", "0.6"]
+    assert colors("memory", PYOPENGL_PLATFORM="osmesa") == ["0.2", "0.4", "0.8", "0.6"]
 
 
 def test_a_program_with_a_window_keeps_its_context(opengl: None, screen: str) -> None:
-    assert colors(WINDOW, PYOPENGL_PLATFORM="glx", DISPLAY=screen) == ["0.2", "0.4", "0.8", "0.6"]
+    assert colors("window", PYOPENGL_PLATFORM="glx", DISPLAY=screen) == ["0.2", "0.4", "0.8", "0.6"]
