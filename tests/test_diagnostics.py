@@ -172,7 +172,7 @@ def test_info_names_versions_driver_and_the_backend_that_auto_takes(capsys):
     assert got["backend"] == ("cpu" if context.software else "gl") == auto_backend()
 
 
-def test_without_egl_info_says_what_to_install(capsys, monkeypatch):
+def test_info_without_egl_names_the_packages_to_install(capsys, monkeypatch):
     """Every EGL library is missing, as on a machine without Mesa."""
     monkeypatch.setattr(gl, "_shared", {})
     monkeypatch.setattr(
@@ -189,7 +189,7 @@ def test_without_egl_info_says_what_to_install(capsys, monkeypatch):
     )
 
 
-def test_mujocos_version_is_that_which_runs_also_where_its_package_is_mujoco_core(monkeypatch):
+def test_mujocos_version_is_right_with_the_package_mujoco_core(monkeypatch):
     installed = importlib.metadata.version
 
     def without_mujoco(name: str) -> str:

@@ -58,7 +58,7 @@ def test_each_physics_step_counts(make: Any, legacy: bool, monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("make", KINDS)
-def test_render_draws_with_the_ripples_what_dm_control_would(make: Any) -> None:
+def test_render_draws_dm_controls_picture_with_the_ripples(make: Any) -> None:
     physics = make(MODEL)
     ripples = couple(physics, MATERIALS, looks={"block": "clay"}, lighting="studio", **OPTIONS)
     size = {"height": 24, "width": 32}

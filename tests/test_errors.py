@@ -54,12 +54,12 @@ def test_every_error_is_caught_as_a_ripple_error_and_keeps_its_message(
     assert error.__bases__ == others.get(error, (RippleError,))
 
 
-def test_a_warning_is_no_error_so_that_the_program_goes_on() -> None:
+def test_a_warning_does_not_end_the_program() -> None:
     assert issubclass(of_application.RippleWarning, UserWarning)
     assert not issubclass(of_application.RippleWarning, RippleError)
 
 
-def test_what_is_deprecated_works_and_warns_where_it_is_used() -> None:
+def test_deprecated_names_work_and_warn_at_the_users_line() -> None:
     def old_name() -> int:
         deprecated("old_name", "new_name", "2.0")
         return 1

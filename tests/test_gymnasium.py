@@ -252,7 +252,7 @@ def test_an_environment_draws_by_its_own_render_and_with_its_own_camera(
     env.close()
 
 
-def test_the_renderers_of_others_stay_as_they_were(path: Path) -> None:
+def test_renderers_of_other_environments_stay_as_they_were(path: Path) -> None:
     from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 
     before = MujocoRenderer._get_viewer, mujoco.Renderer.render, mujoco.Renderer.scene
@@ -292,7 +292,7 @@ def test_depths_are_those_of_a_depth_buffer() -> None:
     )
 
 
-def test_modes_without_ripples_say_so(path: Path) -> None:
+def test_warning_about_render_modes_without_ripples(path: Path) -> None:
     with pytest.warns(RippleWarning, match="'human', which shows no ripples"):
         RippleWrapper(BallEnv(path, render_mode="human"), MATERIALS, **OPTIONS)
 
@@ -373,7 +373,7 @@ def test_record_video_gets_every_frame_with_its_ripples(
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_gymnasium_finds_no_fault_with_its_own_ant_which_is_made_anew_by_spec_or_pickle() -> None:
+def test_gymnasium_checks_pass_on_its_ant_remade_by_spec_or_pickle() -> None:
     env = RippleWrapper(
         gymnasium.make("Ant-v5"), {"torso_geom": Material(density=100.0)}, **OPTIONS
     )

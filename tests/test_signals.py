@@ -96,7 +96,7 @@ def test_exports_hold_the_samples(tmp_path: Path, samples) -> None:
     )
 
 
-def test_a_wav_without_sensors_is_what_the_camera_hears(tmp_path: Path) -> None:
+def test_a_wav_without_sensors_is_the_sound_at_the_camera(tmp_path: Path) -> None:
     export_scene(
         scene_of(tmp_path, ""), tmp_path / "a.wav", ExportOptions(slow_motion=2.0, **OPTIONS)
     )

@@ -147,7 +147,7 @@ def test_partials_of_the_drums_are_at_their_modes(
         assert heard[near].max() > 3 * np.median(heard[(hertz > 0.7 * mode) & (hertz < 1.4 * mode)])
 
 
-def test_the_track_of_a_video_is_what_was_given(tmp_path: Path) -> None:
+def test_the_sound_of_a_video_is_the_given_sound(tmp_path: Path) -> None:
     sound = 0.5 * np.sin(2 * np.pi * 440 * np.arange(RATE) / RATE)
     clip = Clip(tmp_path / "clip.mp4", H264, Stream(32, 16, 24))
     for _ in range(24):

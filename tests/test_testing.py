@@ -96,7 +96,7 @@ def test_surface_is_displaced_along_its_normals() -> None:
     assert tip == pytest.approx(0.05, rel=0.15)
 
 
-def test_surface_of_a_soft_body_is_where_its_nodes_are() -> None:
+def test_the_surface_of_a_soft_body_lies_on_its_nodes() -> None:
     model = mujoco.MjModel.from_xml_string(
         """<mujoco><worldbody><geom type="plane" size="3 3 1"/>
         <flexcomp name="jelly" type="grid" dim="3" count="3 3 3" spacing=".1 .1 .1" pos="0 0 1"

@@ -71,7 +71,7 @@ def test_a_scene_that_is_there_or_being_made_is_left_alone(unbroken, tmp_path):
 @pytest.mark.parametrize(
     ("error", "state"), [(ValueError("bad"), "failed"), (OSError(errno.ENOSPC, "full"), "full")]
 )
-def test_a_failure_leaves_nothing_behind_and_says_why(tmp_path, monkeypatch, error, state):
+def test_a_failed_scene_leaves_nothing_but_its_reason(tmp_path, monkeypatch, error, state):
     batch = new_batch(tmp_path, 'video = "none"\n')
 
     def fail(*_):
@@ -125,7 +125,7 @@ def test_frames_and_passes_are_read_from_a_tar_file(packed):
         scene.read("clip.mp4")
 
 
-def test_a_tar_file_has_the_same_bytes_in_whatever_steps_it_is_packed(packed, tmp_path):
+def test_a_tar_file_has_the_same_bytes_packed_in_any_steps(packed, tmp_path):
     batch = new_batch(tmp_path, PACKED)
     for numbers in ((1,), (0, 2)):  # as after --retry-failed
         for number in numbers:

@@ -35,7 +35,7 @@ def test_keys_may_be_written_as_tables_or_with_quotes(tmp_path):
     ],
     ids=lambda value: value[:30] or "none",
 )
-def test_wrong_plans_are_refused_with_what_is_valid(tmp_path, old, new, message):
+def test_wrong_plans_are_refused_with_the_expected_values(tmp_path, old, new, message):
     assert old in PLAN
     with pytest.raises(SceneError, match=message):
         small_plan(tmp_path, text=PLAN.replace(old, new))
@@ -114,7 +114,7 @@ def test_numbers_have_12_digits():
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_wrong_distributions_are_refused_with_what_is_valid(given, message):
+def test_wrong_distributions_are_refused_with_the_expected_values(given, message):
     with pytest.raises(SceneError, match=message):
         msgspec.convert(given, Distribution).check("camera.azimuth")
 
@@ -135,12 +135,12 @@ def test_keys_are_names_between_dots_with_a_choice_in_brackets():
 
 
 @pytest.mark.parametrize("key", ["", "a..b", "a.", "a[", "a[]", "1a", "a b"])
-def test_what_is_no_key_is_refused(key):
+def test_invalid_keys_are_refused(key):
     with pytest.raises(SceneError, match="a key must be"):
         parse_key(key)
 
 
-def test_a_number_has_the_same_values_whatever_else_varies(tmp_path):
+def test_the_values_of_a_number_do_not_depend_on_other_variations(tmp_path):
     few = [Variation(small_plan(tmp_path), number) for number in range(4)]
     more = Variation(
         small_plan(
@@ -203,7 +203,9 @@ def test_places_of_one_key_may_have_one_value(tmp_path):
     ],
     ids=lambda value: value or "none",
 )
-def test_keys_that_fit_nothing_are_refused_with_what_there_is(tmp_path, vary, model, message):
+def test_keys_that_fit_nothing_are_refused_with_the_names_in_the_model(
+    tmp_path, vary, model, message
+):
     with pytest.raises(SceneError, match=message):
         varied(tmp_path, vary, model)
 

@@ -158,7 +158,7 @@ def test_a_full_disk_stops_the_batch_and_counts_as_no_failure(here, tmp_path, mo
 
 
 @pytest.mark.parametrize("name", ["keep_plan", "write_index"])
-def test_a_disk_too_full_for_the_batchs_own_files_is_told_as_one(
+def test_a_full_disk_is_reported_for_the_batchs_own_files(
     name, here, tmp_path, monkeypatch, capsys
 ):
     def full(*_):
@@ -173,7 +173,7 @@ def test_a_disk_too_full_for_the_batchs_own_files_is_told_as_one(
     assert "the disk is full: No space left on device; make room" in capsys.readouterr().err
 
 
-def test_a_plan_that_has_changed_is_refused_with_what_changed(tmp_path):
+def test_a_changed_plan_is_refused_with_its_changes(tmp_path):
     new_batch(tmp_path)
     for old, new, message in (
         ("seed = 3", "seed = 4", "plan.seed was 3 and is 4"),
@@ -202,7 +202,7 @@ def test_strings_that_are_not_text_are_damage_as_any_other(tmp_path):
         load_stored(batch.plan)
 
 
-def test_a_key_that_fits_nothing_is_told_before_anything_is_made(tmp_path):
+def test_a_key_that_fits_nothing_is_refused_before_the_first_scene(tmp_path):
     with pytest.raises(SceneError, match=r"no geom\[stoone\]"):
         run_batch(
             small_plan(tmp_path, text=PLAN.replace("geom[stone]", "geom[stoone]")), tmp_path / "out"

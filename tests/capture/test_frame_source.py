@@ -72,7 +72,7 @@ def test_a_ball_leaves_a_streak_as_long_as_it_flies_while_the_shutter_is_open(
         (3.0, 3.0, 1.0),
     ],
 )
-def test_what_is_out_of_focus_blurs_to_the_disc_of_a_thin_lens(
+def test_points_out_of_focus_blur_to_the_disc_of_a_thin_lens(
     opengl, make_scene, depth, focus, alpha
 ):
     aperture = 0.12
@@ -105,7 +105,7 @@ def test_one_exposure_is_the_plain_frame(opengl, make_scene, transparent):
     np.testing.assert_array_equal(single, plain)
 
 
-def test_a_camera_that_goes_round_blurs_what_stands_still(opengl, make_scene):
+def test_an_orbiting_camera_blurs_fixed_objects(opengl, make_scene):
     right = (slice(None), slice(WIDTH // 2 + 12, None))
     orbit = 120.0
     depth = 1.2
@@ -212,7 +212,7 @@ def test_the_free_camera_looks_at_the_middle_of_the_model(world):
     assert np.linalg.norm(pose.position - pose.focus) == pytest.approx(2.0)
 
 
-def test_an_orbiting_camera_goes_round_what_it_looks_at(world):
+def test_an_orbiting_camera_circles_the_point_that_it_looks_at(world):
     for entry in (CameraEntry(distance=2.0, orbit=30.0), CameraEntry(name="corner", orbit=30.0)):
         start, quarter, full = (viewpoint(*world, entry, time).pose() for time in (0.0, 3.0, 12.0))
         np.testing.assert_allclose(quarter.focus, start.focus, atol=1e-12)
@@ -288,7 +288,7 @@ def test_a_tracking_camera_of_the_model_turns_to_the_body_upright(world):
         assert pose.rotation[2, 1] > 0  # and not upside down
 
 
-def test_a_camera_focuses_on_what_it_is_told_to(world):
+def test_a_camera_focuses_on_a_distance_a_body_or_a_point(world):
     model, data = world
     # looks along x, from x = -4
     free = {"lookat": (0.0, 0.0, 1.0), "distance": 4.0, "azimuth": 0.0, "elevation": 0.0}

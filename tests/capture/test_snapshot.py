@@ -39,14 +39,14 @@ def test_each_frame_has_the_state_of_its_own_time(make_scene) -> None:
     assert snapshot.heights["egg"].any()
 
 
-def test_only_as_many_snapshots_as_are_in_use_keep_their_bodies(make_scene) -> None:
+def test_only_snapshots_in_use_keep_their_bodies(make_scene) -> None:
     states = taken(make_scene(), 5, alive=2)
     assert len({id(state.data) for state in states}) == 2
     times = [state.data.time for state in states]
     np.testing.assert_allclose(times, np.array([4, 3, 4, 3, 4]) / FPS, atol=1e-12)
 
 
-def test_impulses_are_those_since_the_frame_before_and_none_is_told_twice(make_scene) -> None:
+def test_impulses_are_reported_once_since_the_previous_frame(make_scene) -> None:
     scene = make_scene(bodies=HITTING, script=DOWN)
     alone = Simulation(scene, fps=FPS, backend="cpu")
     told = 0

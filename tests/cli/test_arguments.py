@@ -65,7 +65,7 @@ def test_a_word_is_read(parse: str, word: str, value: object) -> None:
         ("color", ["red", "#ff00", "1,1", "1,1,2", "1,1,nan"], "three numbers from 0 to 1"),
     ],
 )
-def test_what_is_not_valid_is_quoted_with_what_would_be(
+def test_invalid_words_are_quoted_with_the_expected_ones(
     parse: str, words: list[str], valid: str
 ) -> None:
     for word in words:

@@ -59,7 +59,7 @@ def told(capsys):
     return run
 
 
-def test_json_tells_size_area_quality_seconds_and_what_was_mended(told, ball_file):
+def test_json_has_size_area_quality_seconds_and_repairs(told, ball_file):
     report = told(ball_file)
     assert report["mesh"] == str(ball_file)
     assert (report["vertices"], report["triangles"], report["method"]) == (162, 320, "progressive")
@@ -78,7 +78,7 @@ def test_json_tells_size_area_quality_seconds_and_what_was_mended(told, ball_fil
     assert {"load", "cache"} == told(ball_file)["seconds"].keys()
 
 
-def test_a_body_with_a_limb_gets_patches_and_the_report_says_why(told, tmp_path):
+def test_a_body_with_a_limb_gets_patches_with_a_reason_in_the_report(told, tmp_path):
     V, F = thin_limb(3, 0.1)
     trimesh.Trimesh(V, F, process=False).export(tmp_path / "limb.off")
     report = told(tmp_path / "limb.off")
@@ -86,7 +86,7 @@ def test_a_body_with_a_limb_gets_patches_and_the_report_says_why(told, tmp_path)
     assert re.search(r"the cube would be up to \d+ times as long as wide", *report["notes"])
 
 
-def test_the_plain_report_says_the_same(capsys, ball_file):
+def test_the_plain_report_has_the_same_facts(capsys, ball_file):
     assert cli.main(["atlas", str(ball_file), "--resolution", "8"]) == 0
     out = capsys.readouterr().out
     assert re.search(r"^size +4 x .* m$", out, re.MULTILINE)
@@ -121,14 +121,14 @@ def test_a_picture_without_a_place_is_refused_before_the_mesh_is_read(
     assert re.search(said, refusal("atlas", "mesh.obj", "--plot", path))
 
 
-def test_repair_closes_or_says_what_to_install(refusal, monkeypatch, open_file):
+def test_repair_closes_holes_or_names_the_package_to_install(refusal, monkeypatch, open_file):
     monkeypatch.setitem(sys.modules, "pymeshfix", None)
     assert "boundary edges" in refusal("atlas", str(open_file), "--layout", "cube")
     for command in (["atlas"], ["drop", "-o", "clip.mp4"]):
         assert "pip install 'ripple-sim[repair]'" in refusal(*command, str(open_file), "--repair")
 
 
-def test_repair_says_what_it_did(told, open_file):
+def test_repair_lists_its_changes(told, open_file):
     pytest.importorskip("pymeshfix")
     assert [note[:11] for note in told(open_file, "--repair")["notes"]] == [
         "1 unreferen",
@@ -136,7 +136,7 @@ def test_repair_says_what_it_did(told, open_file):
     ]
 
 
-def test_wrapped_balls_get_one_atlas_and_a_line_that_says_so(capsys, refusal, tmp_path):
+def test_wrapped_balls_get_one_atlas_and_a_note(capsys, refusal, tmp_path):
     trimesh.util.concatenate([BALL, BALL.copy().apply_translation([1, 0, 0])]).export(
         tmp_path / "balls.off"
     )
@@ -161,7 +161,7 @@ def test_an_open_mesh_gets_patches(told, open_file):
     assert charts * n * n == pytest.approx(6 * 32**2, rel=0.2)
 
 
-def test_the_thickness_over_what_is_inside_is_told_and_drawn(
+def test_the_thickness_over_an_inner_body_is_reported_and_drawn(
     coarse_pictures, tmp_path, told, refusal, ball_file
 ):
     core = tmp_path / "core.off"

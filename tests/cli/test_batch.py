@@ -31,7 +31,7 @@ def test_a_dry_run_tells_values_time_and_room_and_leaves_nothing(plan, capsys):
     ]
 
 
-def test_the_status_is_told_from_the_folder(tmp_path, capsys):
+def test_the_status_comes_from_the_folder(tmp_path, capsys):
     batch = new_batch(tmp_path)
     assert main(["batch", str(batch.path), "--status"]) == 0
     assert "0 of 5 scenes finished, 0 put aside, 5 to be made" in capsys.readouterr().out
@@ -50,7 +50,7 @@ def test_the_status_is_told_from_the_folder(tmp_path, capsys):
     ],
     ids=["no folder", "shard", "no batch", "no plan"],
 )
-def test_what_is_wrong_is_told_in_a_line(plan, refusal, options, message):
+def test_errors_are_one_line(plan, refusal, options, message):
     assert message in refusal(
         "batch", *(each.format(plan=plan, folder=plan.parent) for each in options)
     )

@@ -99,7 +99,7 @@ def test_a_bad_output_is_refused_before_the_scene_is_read(
     assert list(tmp_path.iterdir()) == [tmp_path / "broken"]
 
 
-def test_a_folder_that_is_not_there_is_told_before_the_viewer_opens(refusal):
+def test_a_missing_folder_is_refused_before_the_viewer_opens(refusal):
     assert "there is no folder 'nowhere' for screenshots" in refusal(
         "view", "sphere", "--folder", "nowhere"
     )
@@ -125,9 +125,7 @@ def test_a_device_that_is_not_there_is_a_failure_in_one_line(tmp_path, monkeypat
     ],
     ids=lambda argv: argv[0],
 )
-def test_a_missing_input_is_told_before_what_the_machine_lacks(
-    tmp_path, monkeypatch, refusal, argv
-):
+def test_a_missing_input_is_reported_before_a_missing_device(tmp_path, monkeypatch, refusal, argv):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
@@ -155,7 +153,9 @@ def noted(ending: BaseException) -> BaseException:
         (noted(KeyboardInterrupt()), 130, "interrupted; 48 frames are kept"),
     ],
 )
-def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, error, status, line):
+def test_the_exit_status_is_2_for_bad_input_and_1_for_other_errors(
+    monkeypatch, capsys, error, status, line
+):
     monkeypatch.setattr(reports.InfoCommand, "run", Mock(side_effect=error))
     assert cli.main(["info"]) == status
     assert capsys.readouterr().err == f"ripple-sim: {line}\n"
@@ -165,7 +165,7 @@ def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, er
     ("words", "need"),
     [("render duck -o x.mp4", 2.4), ("export duck -o x.usda", 3.0), ("atlas a.obj", 1.2)],
 )
-def test_little_address_space_is_told_at_once_with_what_is_needed(tmp_path, words, need):
+def test_little_address_space_is_reported_at_once_with_the_need(tmp_path, words, need):
     """Later OpenBLAS, LLVM or Mesa run out of it, and end the process or blame something else."""
     code = f"ulimit -v 800000; {sys.executable} -m ripple_sim {words}"
     result = subprocess.run(

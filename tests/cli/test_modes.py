@@ -13,7 +13,7 @@ from ripple_sim.figures import atlas_painter, mode_plot
 SHEET = "v 0 0 0\nv 0.5 0 0\nv 1 0 0\nv 0 0 1\nv 0.5 0 1\nv 1 0 1\nf 1 4 5 2\nf 2 5 6 3\n"
 
 
-def test_a_sheet_fixed_at_its_rim_is_told_and_drawn(tmp_path, monkeypatch, capsys):
+def test_modes_of_a_sheet_with_a_fixed_rim_are_printed_and_drawn(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(atlas_painter, "OVERSAMPLING", 1)
     monkeypatch.setattr(mode_plot, "_LARGEST", 64)
     mesh = tmp_path / "sheet.obj"
@@ -55,7 +55,7 @@ def test_a_sheet_fixed_at_its_rim_is_told_and_drawn(tmp_path, monkeypatch, capsy
         ("membrane,density=1 --count=99", "must be a whole number from 1 to"),
     ],
 )
-def test_what_is_wrong_is_told(refusal, tetrahedron, material, said):
+def test_invalid_materials_and_counts_are_refused(refusal, tetrahedron, material, said):
     material, *more = material.split(" ")
     argv = ("modes", str(tetrahedron), "--material", material, "--resolution", "4", *more)
     assert said in refusal(*argv)

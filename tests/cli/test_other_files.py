@@ -35,7 +35,7 @@ def tree(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_what_was_made_here_is_replaced_by_the_next_job(tmp_path: Path, ending: str) -> None:
+def test_our_own_output_is_replaced_by_the_next_job(tmp_path: Path, ending: str) -> None:
     made = tmp_path / f"clip{ending}"
     write(made, count=3)
     write(made, count=2)
@@ -52,7 +52,7 @@ def test_exr_frames_are_known_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", ENDINGS[:-1])
-def test_anothers_file_is_replaced_only_when_told_to(tmp_path: Path, ending: str) -> None:
+def test_a_foreign_file_is_replaced_only_with_overwrite(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"holiday{ending}"
     path.write_bytes(b"precious")
     said = "exists and was not made by ripple-sim; name another file, or add --overwrite"
@@ -65,7 +65,7 @@ def test_anothers_file_is_replaced_only_when_told_to(tmp_path: Path, ending: str
     assert made_here(path)
 
 
-def test_anothers_frames_are_replaced_only_when_told_to(tmp_path: Path) -> None:
+def test_foreign_frames_are_replaced_only_with_overwrite(tmp_path: Path) -> None:
     path = tmp_path / "frames"
     path.mkdir()
     Image.fromarray(FRAME).save(path / "frame_00000.png")
@@ -81,7 +81,7 @@ def test_anothers_frames_are_replaced_only_when_told_to(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("overwrite", [False, True])
 @pytest.mark.parametrize("kind", ["folder", "link"])
-def test_what_has_a_frames_name_and_is_no_file_is_never_deleted(
+def test_a_folder_with_a_frames_name_is_never_deleted(
     tmp_path: Path, kind: str, overwrite: bool
 ) -> None:
     stranger = tmp_path / "thesis"

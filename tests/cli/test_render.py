@@ -67,7 +67,7 @@ def test_a_terminal_shows_title_and_frames_done(monkeypatch: pytest.MonkeyPatch,
     assert capsys.readouterr().out == ""
 
 
-def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compilation_is_reported_with_its_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     told = terminal(monkeypatch)
     kernels = "ripple_sim.solver.backends.step_kernels"
     monkeypatch.setattr("ripple_sim.solver.compile_clock.compiling", lambda: kernels)
@@ -80,7 +80,7 @@ def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.Mon
     )
 
 
-def test_what_takes_long_is_logged_and_printed_as_a_line(monkeypatch, capsys, caplog) -> None:
+def test_long_work_is_logged_and_printed_as_a_line(monkeypatch, capsys, caplog) -> None:
     monkeypatch.setattr(compile_clock._listener, "seconds", {"ripple_sim.solver": 2.1})
     monkeypatch.setattr(compile_clock._listener, "warned", False)
 
@@ -101,7 +101,7 @@ def test_what_takes_long_is_logged_and_printed_as_a_line(monkeypatch, capsys, ca
     assert [record.levelname for record in caplog.records] == ["WARNING"] * 2
 
 
-def test_an_error_goes_on_through_the_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_passes_through_the_progress_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal(monkeypatch)
     with pytest.raises(KeyboardInterrupt), frame_progress("renderer"):
         raise KeyboardInterrupt

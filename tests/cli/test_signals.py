@@ -141,7 +141,7 @@ def test_no_exception_is_raised_within_a_call_of_moderngls_but_soon_after(number
     assert within("elsewhere", number) == []
 
 
-def test_what_a_finalizer_swallows_comes_again() -> None:
+def test_a_signal_that_a_finalizer_swallows_is_raised_again() -> None:
     class Dying:
         def __del__(self) -> None:
             signal.raise_signal(signal.SIGTERM)

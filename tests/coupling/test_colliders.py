@@ -130,7 +130,7 @@ def solid(
 
 
 @pytest.mark.parametrize("place", [{}, {"pos": [0.3, 0.1, 0.2], "quat": [0.5, 0.5, 0.1, 0.7]}])
-def test_flex_lies_as_deep_inside_of_the_mesh_as_it_is_thick(place: dict[str, list[float]]) -> None:
+def test_a_flex_collider_lies_one_thickness_inside_the_mesh(place: dict[str, list[float]]) -> None:
     model = mesh_spec(peanut(0.04), **place).compile()
     data = forwarded(model)
     flex = find_flex_colliders(model)[model.geom("target").id]

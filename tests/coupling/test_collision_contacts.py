@@ -205,7 +205,7 @@ def test_no_warning_without_a_gap_or_without_collisions() -> None:
             Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
 
 
-def test_geoms_that_a_flex_meets_badly_are_named() -> None:
+def test_geoms_that_collide_badly_with_a_flex_are_named() -> None:
     spec = mesh_spec(peanut(0.06), "free")
     arm = (base := spec.body("base")).add_body(name="arm", pos=[0, 0, 0.5])
     arm.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE)
@@ -262,7 +262,9 @@ LINK = '<body name="link">{}</body>' + BALL.format("0 0 2")
         ),
     ],
 )
-def test_target_that_nothing_can_touch_says_so(link: str, target: Target, message: str) -> None:
+def test_warning_about_a_target_that_nothing_can_touch(
+    link: str, target: Target, message: str
+) -> None:
     with pytest.warns(RippleWarning, match=message):
         Ripples(model_of(LINK.format(link)), {"shell": target}, resolution=8, backend="cpu")
 

@@ -71,7 +71,7 @@ def test_every_contact_with_a_force_is_found_once_for_each_target_it_touches(
             np.testing.assert_allclose(points - place, outside[:, None] * normal, atol=1e-15)
 
 
-def test_speculative_contact_loads_the_target_where_it_is() -> None:
+def test_a_speculative_contact_loads_the_target_in_place() -> None:
     """MuJoCo's speculative contacts have overlaps of metres, which must not move their points."""
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0.1 0 0.53"))
     data = mujoco.MjData(model)
@@ -120,7 +120,7 @@ def push_on_target(contacts: Contacts) -> np.ndarray:
     return -contacts.forces @ contacts.normals
 
 
-def test_a_body_at_rest_on_a_flex_and_a_geom_weighs_on_both_what_it_weighs() -> None:
+def test_a_body_at_rest_on_a_flex_and_a_geom_presses_with_its_weight() -> None:
     model = slab_and_table(PLANK)
     slab, table, plank = (model.geom(name).id for name in ("slab", "table", "plank"))
     reader = reader_of(model, "slab", "table")

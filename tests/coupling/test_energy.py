@@ -133,7 +133,7 @@ def test_ledger_of_a_free_fall_is_exact() -> None:
     assert end.waves == 0
 
 
-def test_momentum_is_what_the_body_loses() -> None:
+def test_the_surface_gains_the_momentum_that_the_body_loses() -> None:
     model = scene("box", 0.7, 0.001, 0.3, cone="elliptic")
     run = coupled(model, Material(1.0, 0.0, 0.0, density=500.0), conserve_volume=False).until(0.5)
     assert run.given() > 0.5

@@ -18,7 +18,7 @@ NAMELESS = """<geom type="plane" size="1 1 1"/>
 <geom size="0.1"/><body pos="0 0 1"><geom size="0.1"/></body></body>"""
 
 
-def test_every_geom_has_a_name_of_its_own_by_which_it_is_found() -> None:
+def test_every_geom_is_found_by_its_own_name() -> None:
     model = model_of(NAMELESS)
     names = [geom_name(model, geom) for geom in range(model.ngeom)]
     # the fourth geom of the torso would be "torso/3", but another one is called so
@@ -132,7 +132,7 @@ def test_colliders_of_targets(model, targets, contacts, expected) -> None:
     ] == expected
 
 
-def test_a_pair_collides_whatever_its_masks_say() -> None:
+def test_an_explicit_pair_collides_despite_its_masks() -> None:
     seen = f'<body name="a"><freejoint/><geom name="a" size="0.1" {SEEN}/></body>'
     spec = mujoco.MjSpec.from_string(
         f"""<mujoco><worldbody>{seen}<geom name="b" size="0.1" {SEEN}/>
@@ -311,7 +311,9 @@ def test_a_flex_collider_stands_for_its_geom(coupled: CoupledModel) -> None:
     )
 
 
-def test_geoms_collide_where_either_mask_says_so_but_not_on_one_body(coupled: CoupledModel) -> None:
+def test_geoms_collide_if_either_mask_allows_it_and_never_on_one_body(
+    coupled: CoupledModel,
+) -> None:
     ball, pebble = numbers(coupled, "ball", "pebble")
     assert np.flatnonzero(coupled.can_collide(ball)).tolist() == numbers(coupled, "target")
     assert coupled.model.geom_contype[pebble] & coupled.model.geom_conaffinity[pebble]

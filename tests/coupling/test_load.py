@@ -89,7 +89,7 @@ def test_after_all_geoms_have_left_the_whole_impulse_has_been_given(steps: int) 
     assert given + given_until_over(load) == pytest.approx(pushed, rel=1e-9)
 
 
-def test_new_waves_on_the_same_atlas_get_what_the_old_ones_did_not() -> None:
+def test_new_waves_on_the_same_atlas_get_the_outstanding_load() -> None:
     """After a rest with chatter there is a deficit; it survives a change of the material."""
     pose = tilted()
     kept = sphere_load()
@@ -106,7 +106,7 @@ def test_new_waves_on_the_same_atlas_get_what_the_old_ones_did_not() -> None:
     assert given_until_over(changed) == pytest.approx(deficit, rel=1e-12)
 
 
-def test_what_bears_on_fixed_texels_is_lost() -> None:
+def test_forces_on_fixed_texels_are_lost() -> None:
     """Footprints made for the old waves must not serve the new ones."""
     atlas = sphere_atlas(1.0, 16)
     pose = tilted()
@@ -152,7 +152,7 @@ def test_the_point_lies_within_the_texel() -> None:
         assert away < 0.95 * np.sqrt(atlas.areas[impulse.texel])
 
 
-def test_parts_of_one_flex_are_told_of_together_at_their_middle_on_the_surface() -> None:
+def test_impulses_on_one_flex_are_reported_as_one_at_their_mean_point() -> None:
     record, pose = record_of()
     names = ["globe", "cloth"]
     owners = np.array([0, 1, 1, 1])
@@ -165,7 +165,7 @@ def test_parts_of_one_flex_are_told_of_together_at_their_middle_on_the_surface()
     np.testing.assert_allclose(local, middle / np.linalg.norm(middle), atol=2e-3)
 
 
-def test_a_target_gets_the_same_load_whether_others_ripple_or_not() -> None:
+def test_the_load_of_a_target_does_not_depend_on_other_targets() -> None:
     """Targets with bodies on them have the same waves alone and together, bit for bit."""
     rng = np.random.default_rng(4)
     target = '<geom name="{}" type="box" size="0.3 0.3 0.05" pos="{} 0 0"/>'
@@ -221,7 +221,7 @@ GROOVE = """<mujoco><option timestep="0.001"/><asset>
 </mujoco>"""
 
 
-def test_a_wedged_ball_is_told_of_where_it_touches() -> None:
+def test_impulses_of_a_wedged_ball_are_reported_where_it_touches() -> None:
     """The middle of its contacts lies in the air between the two walls."""
     model = mujoco.MjModel.from_xml_string(GROOVE.format(height=0.16 * np.sqrt(2) + 1e-3))
     run = Run(model, "groove", density=10, resolution=16, contacts=["left", "right"])

@@ -88,7 +88,7 @@ def test_impulses_of_several_steps_are_those_of_each(loop: Loop) -> None:
     assert given == pytest.approx(gained, rel=2e-3)
 
 
-def test_missed_steps_are_counted_and_told_once() -> None:
+def test_one_warning_counts_missed_steps() -> None:
     ripples, model, data = bounce()
     given = 0.0
     said = r"5 physics steps .* other 4; call `ripples.mj_step\(data, nstep=5\)`"
@@ -161,7 +161,7 @@ def test_forces_lost_to_a_new_collision_are_found_again(two_way: bool, integrato
     np.testing.assert_allclose(places[1], places[0], atol=1e-6)
 
 
-def test_forces_that_cannot_be_found_again_are_told_of() -> None:
+def test_warning_about_forces_that_cannot_be_recomputed() -> None:
     """With poses of the coming step its forces are taken."""
     ripples, model, data = bounce()
     given = 0.0
@@ -219,7 +219,7 @@ def test_waves_begin_anew_with_the_simulation(unseen: int, keyframe: int | None)
     assert ripples["block"].time == model.opt.timestep
 
 
-def test_a_simulation_that_diverges_takes_the_waves_along_and_says_so(in_tmp_path: None) -> None:
+def test_a_diverged_simulation_resets_the_waves_with_a_warning(in_tmp_path: None) -> None:
     ripples, model, data = bounce()
     own_steps(ripples, model, data)
     with pytest.warns(RippleWarning, match=r"diverged \(mjWARN_BADQVEL\): MuJoCo reset it") as told:
@@ -244,9 +244,7 @@ def test_a_warning_names_the_line_that_steps(loop: Loop, in_tmp_path: None) -> N
 
 
 @pytest.mark.parametrize("two_way", [False, True])
-def test_a_broken_state_makes_no_waves_where_mujoco_goes_on_with_it(
-    two_way: bool, in_tmp_path: None
-) -> None:
+def test_a_state_with_nan_makes_no_waves(two_way: bool, in_tmp_path: None) -> None:
     """With its automatic reset disabled: NaN positions once ended in an error about points."""
     ripples, model, data = bounce(two_way=two_way)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
@@ -283,7 +281,7 @@ def said_by(run: Callable[[], None]) -> list[str]:
 
 
 @pytest.mark.parametrize("copied", [False, True])
-def test_two_data_in_turn_are_warned_of_once(copied: bool) -> None:
+def test_one_warning_about_two_data_in_turn(copied: bool) -> None:
     """Copies carry the mark of what they were copied from, and others marks of their own."""
     ripples, model, data = bounce()
     ripples.mj_step(data)

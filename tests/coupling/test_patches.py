@@ -31,7 +31,7 @@ def test_four_equal_corners_spread_evenly_over_the_square(block: Atlas) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_force_and_torque_stay_what_they_are(block: Atlas, seed: int) -> None:
+def test_force_and_torque_are_preserved(block: Atlas, seed: int) -> None:
     rng = np.random.default_rng(seed)
     corners = np.column_stack([rng.uniform(-0.3, 0.3, (6, 2)), np.full(6, 0.5)])
     loads = rng.uniform(0.1, 3.0, 6)

@@ -129,7 +129,7 @@ def _one_sphere_map_a_shape() -> Iterator[None]:
 
 @pytest.mark.usefixtures("_one_sphere_map_a_shape", "in_tmp_path")
 @pytest.mark.parametrize("block", range(3))
-def test_impulses_are_the_change_of_momentum_and_waves_low_or_a_warning_says_that_not(
+def test_impulses_are_the_change_of_momentum_and_waves_are_low_unless_warned(
     block: int,
 ) -> None:
     touched = 0

@@ -287,7 +287,7 @@ def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", ["steady", "driven", "noise", "hit"])
-def test_the_force_of_unbroken_contact_passes_as_it_is(kind: str) -> None:
+def test_the_force_of_unbroken_contact_passes_unchanged(kind: str) -> None:
     dt = 0.002
     steps = 2000
     force = np.full(steps, 3.0)
@@ -314,7 +314,7 @@ CHATTER = {"each other step": (0, 6), "sixth": (1.5, 4.4, 4.2, 3.5, 2.9, 0), "th
         *((kind, dt) for kind in CHATTER for dt in (0.0005, 0.002)),
     ],
 )
-def test_nothing_of_chatter_is_lost_and_it_is_averaged(kind: str, dt: float) -> None:
+def test_chatter_is_averaged_without_loss_of_impulse(kind: str, dt: float) -> None:
     steps = round(6.0 / dt)
     force = np.resize(CHATTER[kind], steps).astype(np.float64)
     given = given_over_time(force, dt)

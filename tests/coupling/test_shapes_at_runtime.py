@@ -51,7 +51,7 @@ def test_impulses_lie_on_a_terrain_that_is_written_anew():
     ids=["ball", "rock"],
 )
 @pytest.mark.filterwarnings("ignore:the surface of")
-def test_a_resized_target_gets_a_new_atlas_and_flat_waves_and_others_go_on(name, array, part):
+def test_a_resized_target_gets_a_new_atlas_and_flat_waves_and_others_keep_theirs(name, array, part):
     model, data, ripples = made("ball", "rock")
     other = {"ball": "rock", "rock": "ball"}[name]
     for each in ripples:
@@ -69,7 +69,7 @@ def test_a_resized_target_gets_a_new_atlas_and_flat_waves_and_others_go_on(name,
 
 
 @pytest.mark.filterwarnings("ignore:the surface of")
-def test_two_way_and_copies_by_pickling_go_on():
+def test_two_way_coupling_and_pickled_copies_continue_after_a_change():
     model, data, ripples = made("ball", two_way=True)
     model.geom("ball").size[0] = 0.3
     ripples.mj_step(data, 2)

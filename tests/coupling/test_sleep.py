@@ -111,7 +111,7 @@ def test_bodies_that_start_asleep_press_from_the_beginning(depth: float) -> None
     assert weight(still_asleep(run, 2.0)) == pytest.approx(GRAVITY, rel=1e-3)
 
 
-def test_ripples_that_begin_late_find_what_sleeps() -> None:
+def test_ripples_that_begin_late_find_sleeping_bodies() -> None:
     run = asleep(model_of())
     run.ripples.reset()
     [impulse] = run.until(1.1).hits[-1]

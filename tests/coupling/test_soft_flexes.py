@@ -79,7 +79,7 @@ def test_cloth_presses_evenly_where_it_lies() -> None:
     assert np.abs(velocity[top & (away > 0.26)]).max() < 0.2 * abs(under.mean())
 
 
-def test_cloth_loads_a_round_a_rippling_mesh_and_a_moving_target_with_what_mujoco_tells() -> None:
+def test_cloth_loads_round_meshed_and_moving_targets_with_mujocos_forces() -> None:
     ball = '<geom name="target" size="0.2" mass="2"/>'
     mesh = '<geom name="target" type="{}" mesh="animal" pos="0 0 -0.25" mass="2"/>'
     flexed = draped(mesh.format("mesh"))

@@ -163,7 +163,7 @@ def test_warning_names_body_speed_and_a_time_step_that_does() -> None:
     assert shoot(20.0, f"{2 * timestep} 1", timestep) == (True, [])
 
 
-def test_where_the_time_step_will_do_a_solref_is_named_and_no_longer_step() -> None:
+def test_warning_names_a_solref_where_the_time_step_suffices() -> None:
     back, [message] = shoot(10.0, "0.02 1", 0.002)
     assert not back
     advice = message.split("; ")[-1]
@@ -172,7 +172,7 @@ def test_where_the_time_step_will_do_a_solref_is_named_and_no_longer_step() -> N
     assert shoot(10.0, solref, 0.002) == (True, [])
 
 
-def test_one_warning_serves_all_pairs_but_those_that_are_much_worse() -> None:
+def test_a_pair_is_warned_of_again_only_if_it_is_much_worse() -> None:
     ball = '<body name="{}" pos="{} 0 {}"><freejoint/><geom size="0.03"/></body>'
     balls = [("first", 0.0, 0.2, 10), ("as bad", 0.1, 0.9, 15), ("worse", 0.2, 2.0, 40)]
     xml = f"<worldbody>{PLATE}{''.join(ball.format(*each[:3]) for each in balls)}</worldbody>"

@@ -99,7 +99,7 @@ def test_ripples_adopt_warnings_and_leave_a_handler_that_the_user_has_set() -> N
     assert any("Too many contacts" in each for each in heard)
 
 
-def test_too_little_memory_names_what_to_enlarge() -> None:
+def test_error_about_little_memory_names_the_setting_to_enlarge() -> None:
     model, data = crowd("60K")
     ripples = Ripples(model, {0: Material(density=1.0)}, resolution=8)
     said = r'MuJoCo cannot go on: .*out of memory.*; enlarge <size memory="\.\.\."/>'

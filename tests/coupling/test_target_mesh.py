@@ -11,7 +11,7 @@ from ripple_sim.coupling import height_field_triangles, primitive_triangles, tar
 from ripple_sim.solver import AtlasError
 
 
-def test_equal_geoms_share_one_atlas_whatever_their_names() -> None:
+def test_equal_geoms_share_one_atlas() -> None:
     kinds = ("sphere", "sphere", "ellipsoid", "ellipsoid")
     geoms = (
         f'<geom name="target {i}" type="{kind}" size="0.1 0.2 0.3"/>'
@@ -26,7 +26,7 @@ def test_equal_geoms_share_one_atlas_whatever_their_names() -> None:
     assert target_atlas(model, model.geom("target 0").id, 16) is not first
 
 
-def test_a_mesh_that_gets_no_charts_is_named_with_what_to_do(
+def test_error_about_a_mesh_without_charts_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As heaps of a thousand loose slivers, which covers of robots may be."""

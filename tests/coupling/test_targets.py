@@ -104,7 +104,7 @@ def test_texels_without_waves_do_not_drift_under_a_body_at_rest() -> None:
 @pytest.mark.parametrize(
     "copied", [copy.deepcopy, lambda ripples: pickle.loads(pickle.dumps(ripples))]
 )
-def test_copied_ripples_go_on_as_the_original(copied: Callable[[Ripples], Ripples]) -> None:
+def test_copied_ripples_continue_like_the_original(copied: Callable[[Ripples], Ripples]) -> None:
     model = model_of('<geom name="target" type="box" size="0.5 0.5 0.5"/>' + BALL.format("0 0 0.6"))
     run = Run(model, "target", resolution=16, conserve_volume=True).until(0.15)
     twin = copied(run.ripples)
@@ -127,7 +127,7 @@ def test_the_rim_of_the_surfaces_is_handed_on_and_outlives_changes() -> None:
         Ripples(model, {"target": Material()}, resolution=8, backend="cpu", rim="bent")
 
 
-def test_a_sensor_on_a_site_goes_on_when_the_material_changes() -> None:
+def test_a_sensor_on_a_site_continues_when_the_material_changes() -> None:
     model = model_of(
         '<body name="a" pos="3 0 0" euler="0 0 90"><geom name="target" type="ellipsoid" size="0.3 '
         '0.2 0.2" '

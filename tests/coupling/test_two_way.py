@@ -116,7 +116,7 @@ def pushed(force: Callable[[mujoco.MjData], None]) -> tuple[mujoco.MjData, Rippl
 FORCE = np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-def test_forces_of_others_stay_theirs() -> None:
+def test_users_forces_stay_as_they_were() -> None:
     """A force of the user's is set once, assigned before each step, or removed and set again."""
 
     def assigned(data: mujoco.MjData) -> None:

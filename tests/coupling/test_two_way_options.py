@@ -57,7 +57,7 @@ def test_every_solver_of_mujoco_finds_the_same_forces_and_makes_no_energy(cone: 
     assert impulse > 0.05
 
 
-def test_runge_kutta_is_refused_when_it_is_given_and_when_it_is_chosen_later() -> None:
+def test_runge_kutta_is_refused_at_construction_and_at_a_later_step() -> None:
     run = coupled(
         'integrator="Euler">', '<body pos="0 0 0.05"><freejoint/><geom size="0.05"/></body>', LIGHT
     )
@@ -104,7 +104,7 @@ def test_a_stack_sleeps_in_its_dimple_and_presses_on(
     np.testing.assert_array_equal(run.data.qpos, place)
 
 
-def test_a_wave_wakes_what_sleeps_on_the_surface(places_without_sleep: np.ndarray) -> None:
+def test_a_wave_wakes_a_body_that_sleeps_on_the_surface(places_without_sleep: np.ndarray) -> None:
     run = stack("enable")
     run.ripples["target"].add_impulse([0.2, 0.0, 0.1], -10.0, 0.1)
     assert max(abs(run.until(AT_REST + 0.02 * i).data.qvel[2]) for i in range(1, 8)) > 0.01

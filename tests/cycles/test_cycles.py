@@ -88,7 +88,7 @@ def test_frames_come_back_in_order_and_tone_mapped(
     assert not Path(told["folder"]).exists()
 
 
-def test_the_stage_keeps_what_preview_surfaces_have_no_word_for(folder: Path) -> None:
+def test_the_stage_keeps_properties_that_preview_surfaces_lack(folder: Path) -> None:
     from pxr import Usd
 
     from ripple_sim import ExportOptions, export_scene
@@ -106,7 +106,7 @@ def test_the_stage_keeps_what_preview_surfaces_have_no_word_for(folder: Path) ->
 
 
 @pytest.mark.filterwarnings("ignore:MuJoCo. Insufficient arena memory")
-def test_what_mujoco_says_of_the_first_frame_is_ours(
+def test_mujocos_warnings_of_the_first_frame_are_ours(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ball = '<body pos="1 0 1"><freejoint/><geom size="0.1"/></body>'

@@ -101,7 +101,7 @@ def test_no_name_has_a_retired_word() -> None:
     )
 
 
-def test_the_glossary_has_the_words_that_are_said_instead() -> None:
+def test_the_glossary_has_the_replacements_of_retired_words() -> None:
     page = GLOSSARY.read_text(encoding="utf-8").lower()
     names_in_code = {"unpack", "reusable"}  # of functions, which need no entry
     phrases = {instead.removesuffix("s") for instead in RETIRED.values()} - names_in_code

@@ -104,7 +104,7 @@ def test_the_page_on_scene_files_has_every_table_and_the_words_of_a_look() -> No
     assert ", ".join(f"`{look}`" for look in LOOKS) in text
 
 
-def test_the_tables_of_a_plan_that_take_any_key_are_told_as_tables() -> None:
+def test_tables_of_a_plan_with_free_keys_are_documented_as_tables() -> None:
     text = hook("scene_tables").plan_tables()
     assert all(f"| `{name}` | table |" in text for name in ("vary", "model"))
 

@@ -112,7 +112,7 @@ def test_a_broken_clip_is_an_error_and_no_shorter_video(
 
 
 @pytest.mark.parametrize("counts", [[1], [5], [4, 3], [2, 2, 1]])
-def test_few_colours_of_a_gif_come_back_exactly_however_it_is_cut_into_clips(
+def test_few_colours_of_a_gif_come_back_exactly_with_any_clips(
     tmp_path: Path, counts: list[int]
 ) -> None:
     frames = striped(sum(counts))

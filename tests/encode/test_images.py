@@ -142,7 +142,7 @@ def test_the_command_writes_a_folder_over_older_frames(
     ]
 
 
-def test_an_interrupted_render_goes_on_to_the_same_frames(
+def test_an_interrupted_render_continues_to_the_same_frames(
     exr: None, scene: Scene, tmp_path: Path
 ) -> None:
     options = {**OPTIONS, "transparent": True}
@@ -172,7 +172,7 @@ def test_the_tone_curve_makes_the_picture_of_linear_light(opengl: None) -> None:
     assert np.abs(255 * tone_mapped(light.astype(float)) - picture).max() < 1.6
 
 
-def test_highlights_keep_what_the_screen_cannot_show(opengl: None) -> None:
+def test_exr_frames_keep_highlights_beyond_the_screens_range(opengl: None) -> None:
     metal = '<asset><material name="m" metallic="1" roughness=".2"/></asset>'
     light, picture = (
         render('<geom size="1" material="m"/>', metal, samples=1, linear=way)
@@ -270,7 +270,7 @@ def test_exr_files_hold_the_passes_as_channels(tmp_path: Path) -> None:
     check_passes(tmp_path / "frames", ("depth",), "exr", overwrite=False)
 
 
-def test_what_a_kill_left_half_written_is_no_obstacle(tmp_path: Path) -> None:
+def test_half_written_files_of_a_killed_job_are_replaced(tmp_path: Path) -> None:
     files = pass_files(tmp_path / "clip.mp4")
     files.write(0, PASSES)
     for name in ("passes_00000.npz", "segmentation.json"):

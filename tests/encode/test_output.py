@@ -61,7 +61,7 @@ def test_the_limits_themselves_and_default_rates_are_valid(tmp_path: Path) -> No
         ("/proc/clip.mp4", (1280, 720), 60, "cannot write /proc"),
     ],
 )
-def test_what_cannot_be_written_is_refused_beforehand(
+def test_invalid_outputs_are_refused_before_rendering(
     tmp_path: Path, name: str, size: tuple, fps: int, message: str
 ):
     (tmp_path / "a_file").write_text("mine")
@@ -113,7 +113,7 @@ def test_a_file_that_appears_among_the_older_frames_meanwhile_is_not_deleted(
     assert sorted(path.name for path in folder.iterdir()) == ["frame_00000.png", "notes.txt"]
 
 
-def test_frames_beyond_the_highest_level_of_h264_are_refused_where_others_hold_them(
+def test_frames_too_large_for_h264_are_refused_for_mp4_only(
     tmp_path: Path,
 ) -> None:
     check_output(tmp_path / "clip.mp4", 8192, 4352, 25)

@@ -102,7 +102,7 @@ def test_killed_again_and_again_videos_become_the_same_bytes(tmp_path):
     )
 
 
-def test_an_interrupted_video_says_what_is_left(tmp_path):
+def test_an_interrupted_video_names_the_kept_files(tmp_path):
     with pytest.raises(KeyboardInterrupt) as ending:
         write(tmp_path / "clip.mp4", 0, 60)
     part = tmp_path / "clip.mp4.part"
@@ -124,7 +124,7 @@ def test_without_resume_a_video_starts_anew(interrupted):
     assert list(interrupted.parent.iterdir()) == [interrupted]
 
 
-def test_what_a_kill_left_of_a_finished_video_is_begun_anew(interrupted):
+def test_leftovers_of_a_finished_video_are_begun_anew(interrupted):
     """The frames of a folder are in their place by then, or those of a file removed first."""
     shutil.rmtree(interrupted.with_name("clip.mp4.part") / "frames")
     assert write(interrupted, 0, FRAMES).frames == FRAMES

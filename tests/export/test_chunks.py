@@ -95,7 +95,7 @@ export_scene(load_scene({str(scene_file)!r}), Path({str(again)!r}), {OPTIONS!r},
         assert all(map(np.array_equal, sampled(again, time), sampled(path, time)))
 
 
-def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) -> None:
+def test_an_interrupted_export_names_the_kept_files(scene: Scene, tmp_path: Path) -> None:
     path = tmp_path / "run.usdc"
     with pytest.raises(KeyboardInterrupt) as caught:
         export_scene(scene, path, OPTIONS, progress=interrupting_at(6))
@@ -124,7 +124,7 @@ def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) 
         ("run.usdc", {"chunk": None, "resume": True}, "add --chunk"),
     ],
 )
-def test_what_cannot_be_is_refused_before_it_is_simulated(
+def test_invalid_options_are_refused_before_the_simulation(
     scene, tmp_path, name: str, options: dict, message: str
 ):
     with pytest.raises(RippleError, match=message):
@@ -132,7 +132,7 @@ def test_what_cannot_be_is_refused_before_it_is_simulated(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_is_one_error_and_what_is_complete_stays(scene: Scene, tmp_path: Path) -> None:
+def test_a_full_disk_is_one_error_and_complete_files_stay(scene: Scene, tmp_path: Path) -> None:
     """USD ends the process if a stage lets go of a layer whose file could not be written."""
     path = tmp_path / "run.usdc"
     export_scene(scene, tmp_path / "once" / "run.usdc", OPTIONS)

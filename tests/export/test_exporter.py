@@ -37,7 +37,7 @@ def test_missing_packages_are_named(
 
 
 @pytest.mark.parametrize("name", ["run.usdc", "run.usda", "run.usdz", "run.csv", "run.parquet"])
-def test_files_from_here_are_replaced_and_others_only_when_told_to(
+def test_our_files_are_replaced_and_foreign_files_only_with_overwrite(
     ripples: Ripples, tmp_path: Path, name: str
 ) -> None:
     path = tmp_path / name
@@ -95,7 +95,7 @@ def test_a_file_without_frames_is_refused(ripples: Ripples, tmp_path: Path) -> N
     assert not list(tmp_path.iterdir())
 
 
-def test_a_page_says_once_that_it_shows_an_orthographic_camera_in_perspective(
+def test_one_warning_that_a_page_shows_an_orthographic_camera_in_perspective(
     tmp_path: Path,
 ) -> None:
     xml = """<mujoco><worldbody><geom name="ball" size=".3"/>

@@ -304,7 +304,7 @@ def test_a_lost_graphics_card_comes_back_with_the_waves(browser: Any, egg_page: 
         assert np.abs(pixels(tab) - picture).mean() < 0.5  # of 255
 
 
-def test_a_browser_without_webgl_says_so(browser: Any, egg_page: Path) -> None:
+def test_a_browser_without_webgl_shows_a_message(browser: Any, egg_page: Path) -> None:
     tab = browser.new_page()
     tab.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     tab.goto(egg_page.as_uri())
@@ -312,7 +312,9 @@ def test_a_browser_without_webgl_says_so(browser: Any, egg_page: Path) -> None:
     tab.close()
 
 
-def test_what_a_page_replays_is_said_with_the_reason(scene: Scene, tmp_path: Path) -> None:
+def test_a_page_names_the_targets_that_it_replays_with_the_reason(
+    scene: Scene, tmp_path: Path
+) -> None:
     material = Material(speed=0.5, density=900.0, yield_height=0.01)
     ripples = Ripples(scene.model, {"egg": material}, resolution=8, backend="cpu")
     with (

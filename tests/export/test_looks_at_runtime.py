@@ -145,9 +145,7 @@ def drawn():
 
 
 @pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
-def test_what_is_written_into_the_model_is_seen_at_the_next_frame_and_what_is_undone_too(
-    drawn, change
-):
+def test_changes_of_the_model_and_their_undoing_show_in_the_next_frame(drawn, change):
     before, after = drawn
     now, expected, undone = after(change)
     for one, other in ((now, expected), (undone, before)):
@@ -157,7 +155,7 @@ def test_what_is_written_into_the_model_is_seen_at_the_next_frame_and_what_is_un
     assert (abs(now[0].astype(int) - before[0]).max(axis=2) > 8).sum() > 40
 
 
-def test_what_is_written_before_the_first_frame_is_seen():
+def test_changes_before_the_first_frame_are_seen():
     model, data, ripples = scene()
     with RippleRenderer(model, ripples, *SIZE) as renderer:
         textures(model)
@@ -166,7 +164,7 @@ def test_what_is_written_before_the_first_frame_is_seen():
         assert abs(images_of(renderer, data)[0].astype(int) - first[0]).max() > 100
 
 
-def test_an_upload_in_mujocos_words_is_taken_and_others_are_refused():
+def test_uploads_with_mujocos_names_work_and_other_names_are_refused():
     model, data, ripples = scene()
     with RippleRenderer(model, ripples, *SIZE) as renderer:
         images_of(renderer, data)
@@ -180,7 +178,7 @@ def test_an_upload_in_mujocos_words_is_taken_and_others_are_refused():
                 upload(2)
 
 
-def test_a_change_in_a_large_texture_is_seen_at_once_where_it_is_wide_and_soon_where_it_is_small():
+def test_wide_changes_of_a_large_texture_show_at_once_and_small_ones_soon():
     array = np.zeros(5_000_000, np.uint8)
     watched = WatchedArray(array)
     assert not watched.changed(array)

@@ -155,7 +155,7 @@ def test_a_film_has_every_height_to_half_a_step(browser: Any, film: Path, ours: 
     assert np.abs(np.array(steps) * step - ours[2]).max() < 0.51 * step
 
 
-def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> None:
+def test_the_browser_shows_the_picture_of_our_renderer(shown: Any, ours: tuple) -> None:
     frame, egg, _ = ours
     shown.evaluate(f"ripplePlayer.player.show({SEEN})")
     difference = np.abs(pixels(shown) - frame)
@@ -211,7 +211,7 @@ def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(
         assert (np.abs(pixels(tab) - shown).max(axis=2) > 30).sum() > 100
 
 
-def test_the_floor_is_lit_right_up_to_what_stands_on_it(browser: Any, tmp_path: Path) -> None:
+def test_the_floor_is_lit_right_up_to_the_objects_on_it(browser: Any, tmp_path: Path) -> None:
     floor = '<geom type="plane" size="9 9 1"/>'
     drum = '<geom name="drum" type="cylinder" size="1 .3" pos="0 0 .3"/>'
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{floor}{drum}</worldbody></mujoco>")

@@ -40,7 +40,7 @@ def test_a_ripple_changes_the_picture_where_it_is(egg):
 
 
 @pytest.mark.parametrize(("impulse", "lines"), [(0.0, 0), (1e-6, 1), (3.0, 0)])
-def test_waves_that_no_picture_showed_are_told_of_at_the_end(egg, impulse, lines):
+def test_warning_at_close_about_waves_that_no_picture_showed(egg, impulse, lines):
     model, data, ripples, _ = egg
     renderer = RippleRenderer(model, ripples, width=96, height=72)
     ripples["egg"].add_impulse((0.0, -0.3, 0.1), impulse, radius=0.1)
@@ -66,7 +66,7 @@ def test_the_same_state_gives_the_same_picture_in_the_colour_of_the_geom(egg):
     assert red > 1.5 * max(green, blue)
 
 
-def test_cameras_are_given_as_to_mujocos_renderer_and_without_one_it_is_the_free_one_of_the_model(
+def test_cameras_are_given_as_to_mujocos_renderer_and_default_to_the_free_camera(
     egg,
 ):
     model, data, ripples, renderer = egg
@@ -86,7 +86,7 @@ def test_cameras_are_given_as_to_mujocos_renderer_and_without_one_it_is_the_free
         RippleRenderer(model, ripples, looks={"egg": "glass"})
 
 
-def test_the_camera_of_the_scene_is_that_of_the_picture_however_it_was_given(egg):
+def test_scene_camera_is_the_camera_of_the_picture(egg):
     model, data, _, renderer = egg
     fixed = Camera.from_mjcf(model, data, "side")
     tracking = mujoco.MjvCamera()
@@ -137,7 +137,7 @@ def test_cameras_that_are_not_there_are_refused_in_mujocos_words(egg):
         assert isinstance(error.value, RippleError)
 
 
-def test_after_kinematics_alone_a_camera_is_where_it_belongs_with_a_warning(egg):
+def test_a_camera_after_kinematics_alone_gets_its_pose_with_a_warning(egg):
     model, data, _, renderer = egg
     new = mujoco.MjData(model)
     mujoco.mj_kinematics(model, new)
@@ -273,7 +273,7 @@ def test_lights_and_surroundings_are_mujocos(mujocos, name):
         assert (ours[other < 1.0] < 8.0).all()  # no light of a colour that the lamps lack
 
 
-def test_the_studio_lights_on_demand_and_flags_that_it_lacks_are_told(egg):
+def test_the_studio_lights_on_demand_and_unsupported_flags_are_named(egg):
     model, data, ripples, _ = egg
     seen = {}
     for lighting in ("model", "studio", "auto"):
@@ -292,7 +292,7 @@ def test_the_studio_lights_on_demand_and_flags_that_it_lacks_are_told(egg):
         RippleRenderer(model, ripples, 72, 96, lighting="disco")
 
 
-def test_a_transparent_target_shows_what_is_behind_it_whenever_its_opacity_is_set(egg):
+def test_a_transparent_target_shows_objects_behind_it(egg):
     """Twice blended, as in MuJoCo: where 40 % pass, 16 % of what is behind are seen."""
     model, data = posed(
         MODEL.replace(
@@ -388,7 +388,7 @@ SHOWN = """<mujoco><statistic meansize=".3"/><worldbody><geom name="egg" size=".
   <body pos=".4 0 -.3"><joint/><geom size=".06"/></body></worldbody></mujoco>"""
 
 
-def test_options_say_what_is_shown_and_what_is_not_drawn_is_told_once():
+def test_options_choose_the_drawn_objects_and_one_warning_names_the_rest():
     model, data = posed(SHOWN)
     ripples = Ripples(model, {"egg": Material()}, resolution=8)
     kinds = mujoco.mjtObj

@@ -37,7 +37,7 @@ def flat():
 
 @pytest.mark.parametrize("name", edited_scenes.EDITS)
 @pytest.mark.filterwarnings("ignore:not drawn")
-def test_what_is_edited_is_seen_in_colours_depth_and_segmentation_as_in_mujoco(mujocos, flat, name):
+def test_edits_show_in_colours_depth_and_segmentation_as_in_mujoco(mujocos, flat, name):
     ours = edited_scenes.drawn(*flat, name)
     theirs = {kind: mujocos[f"{name} {kind}"] for kind in ours}
     code, expected = (each["segmentation"] @ [1, 1000] for each in (ours, theirs))
@@ -109,7 +109,7 @@ def test_waves_ride_on_their_geom_to_where_the_scene_has_it():
     np.testing.assert_allclose(nearest, 0.5, atol=0.01)  # radius 0.4 m, and the waves
 
 
-def test_an_entry_of_another_shape_is_drawn_in_that_shape_without_ripples_and_told_of_once(flat):
+def test_an_entry_of_another_shape_is_drawn_without_ripples_with_one_warning(flat):
     renderer, data = flat
     renderer.update_scene(data, "c")
     renderer.scene.geoms[edited_scenes.TARGET].size = [0.9, 0.9, 0.9]

@@ -38,14 +38,14 @@ POINTS = st.just([1.0, 0.0, 0.0]) | VALUES
 
 @fuzzed
 @given(st.sampled_from(sorted(MAKERS)), VALUES, VALUES, VALUES)
-def test_any_arguments_of_what_makes_something(name: str, a: Any, b: Any, c: Any) -> None:
+def test_constructors_with_any_arguments(name: str, a: Any, b: Any, c: Any) -> None:
     with np.errstate(all="ignore"):
         outcome(lambda: MAKERS[name](a, b, c))
 
 
 @fuzzed
 @given(st.sampled_from(sorted(ACTIONS)), POINTS, VALUES, VALUES, st.floats(0, 0.05))
-def test_any_arguments_of_what_acts_on_waves(name: str, a: Any, b: Any, c: Any, dt: float) -> None:
+def test_methods_of_waves_with_any_arguments(name: str, a: Any, b: Any, c: Any, dt: float) -> None:
     waves = WaveSolver(ATLAS, backend="cpu")
     with np.errstate(all="ignore"):
         calls = (

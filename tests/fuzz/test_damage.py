@@ -120,7 +120,7 @@ def read_all(folder: Path) -> None:
 @given(
     st.sampled_from(sorted(STORES)), DAMAGES, st.sampled_from(["", "--status", "--retry-failed"])
 )
-def test_a_damaged_batch_goes_on_or_is_refused(
+def test_a_damaged_batch_continues_or_is_refused(
     batches: Path, name: str, damages: list, flag: str
 ) -> None:
     with home_of_others() as home:

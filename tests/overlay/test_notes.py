@@ -54,7 +54,7 @@ def test_colors_diverge_evenly_from_a_bright_middle() -> None:
 
 
 @pytest.mark.parametrize("vision", [np.eye(3), DEUTAN, PROTAN])
-def test_signs_are_told_apart_by_every_eye(vision: np.ndarray) -> None:
+def test_signs_differ_for_every_colour_vision(vision: np.ndarray) -> None:
     seen = lab(linear(overlay.color_table().astype(float)) @ vision.T)
     apart = np.linalg.norm(seen - seen[::-1], axis=1)
     middle = overlay.SIZE // 2
@@ -118,7 +118,7 @@ def test_limit_grows_to_round_numbers_and_never_shrinks() -> None:
     assert (np.diff(seen) > 0).sum() < 50  # and stands still again
 
 
-def test_limit_starts_with_what_it_sees_catches_up_and_stays_where_it_is_fixed() -> None:
+def test_the_limit_follows_the_values_unless_it_is_fixed() -> None:
     limit = Limit()
     assert [limit.follow(each, 0.1) for each in (0.0, 0.035)] == [0.0, 0.04]
     assert Limit(fixed=0.3).follow(7.0, 0.1) == 0.3
@@ -127,7 +127,7 @@ def test_limit_starts_with_what_it_sees_catches_up_and_stays_where_it_is_fixed()
     assert limit.goal == 4
 
 
-def test_limit_with_a_memory_overlooks_what_is_short() -> None:
+def test_a_limit_with_memory_ignores_short_peaks() -> None:
     limit = Limit(floor=0.01, memory=0.25)
     for _ in range(2):
         limit.follow(0.05, 1 / 60)

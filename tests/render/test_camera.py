@@ -83,7 +83,7 @@ def test_cameras_of_all_kinds_have_the_pose_and_angle_of_mujocos(given, theirs):
         (mujoco_camera("FIXED"), "no camera -1"),
     ],
 )
-def test_what_is_no_camera_is_refused(given, message: str):
+def test_invalid_cameras_are_refused(given, message: str):
     model = mujoco.MjModel.from_xml_string(MJCF)
     with pytest.raises(SceneError, match=message):
         render.find_viewpoint(model, mujoco.MjData(model), given)
@@ -180,7 +180,7 @@ def test_box_holds_the_ball(lens: tuple[float, float], others: dict[str, object]
 
 
 @pytest.mark.parametrize("others", [{}, OFF_CENTRE, PARALLEL, PARALLEL | OFF_CENTRE])
-def test_points_in_focus_stay_in_the_frame_wherever_on_the_lens_the_eye_is_and_rays_end_at_points(
+def test_points_in_focus_stay_in_place_for_all_eyes_on_the_lens(
     others,
 ) -> None:
     middle = pose(1, **others)
@@ -215,9 +215,7 @@ def test_the_near_plane_moves_on_to_the_first_ball_ahead_and_no_farther(others) 
     assert dataclasses.replace(camera, clip=None).planes_about(balls) == (0.02 * 2.0, 200.0 * 2.0)
 
 
-def test_where_only_perspective_can_be_shown_it_has_the_same_height_in_focus_with_one_warning() -> (
-    None
-):
+def test_a_substitute_perspective_has_the_same_height_in_focus_with_one_warning() -> None:
     plain = pose(1)
     parallel = pose(1, **PARALLEL)
     assert plain.in_perspective(1.5, "the page") is plain

@@ -151,7 +151,7 @@ def painted(mesh: Mesh, texture=None) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     return spec.compile(), notes
 
 
-def test_half_transparent_materials_are_told_of_and_gloss_is_the_mean(tmp_path: Path) -> None:
+def test_half_transparent_materials_are_named_and_gloss_is_the_mean(tmp_path: Path) -> None:
     file = Gltf()
     gloss = file.texture([[[0, 128, 255]]])
     first = file.add(
@@ -171,7 +171,7 @@ def test_half_transparent_materials_are_told_of_and_gloss_is_the_mean(tmp_path: 
     assert model.mat_roughness[0] == pytest.approx((128 / 255 + 9) / 10)
 
 
-def test_lost_image_are_told_of_in_one_line(tmp_path: Path) -> None:
+def test_lost_images_are_named_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "damaged.png").write_bytes(b"no image")
     file = Gltf()
     sources = [

@@ -50,7 +50,7 @@ def changed(**entries: object) -> dict:
         (changed(duration=True), "Expected `float`, got `bool` - at `duration`"),
     ],
 )
-def test_mistakes_are_named_with_file_place_and_what_is_valid(table: dict, message: str) -> None:
+def test_mistakes_are_named_with_file_place_and_expected_values(table: dict, message: str) -> None:
     with pytest.raises(SceneError, match=message) as error:
         scene.parse_scene(table, "a.toml")
     assert str(error.value).startswith("scene file 'a.toml': ")
@@ -277,7 +277,7 @@ def test_warning_about_an_event_after_the_end() -> None:
         ),
     ],
 )
-def test_each_mistake_is_named_with_its_value_and_what_is_valid(
+def test_each_mistake_is_named_with_its_value_and_the_expected_values(
     targets, others: dict, message: str
 ) -> None:
     with pytest.raises(RippleError, match=message):

@@ -33,7 +33,7 @@ def meshes() -> list[Mesh]:
     return found
 
 
-def test_every_target_of_the_cube_layout_has_one_and_there_are_no_others(
+def test_every_cube_target_has_a_stored_sphere_map(
     meshes: list[Mesh],
 ) -> None:
     assert {sphere_map_path(mesh) for mesh in meshes} == set(FOLDER.glob("*.npy"))
@@ -44,7 +44,7 @@ def test_they_are_certified(meshes: list[Mesh]) -> None:
         assert certify(mesh.F, shipped_sphere_map(mesh)).valid
 
 
-def test_they_are_those_of_today(meshes: list[Mesh]) -> None:
+def test_stored_sphere_maps_equal_newly_built_maps(meshes: list[Mesh]) -> None:
     # they may differ in round-off, and so in their vertices, but not in how evenly they spread the
     # area
     mesh = min(meshes, key=lambda mesh: len(mesh.V))

@@ -29,7 +29,7 @@ def keep(name: str, *, age: float, size: int = 1_000_000) -> Path:
     return path
 
 
-def test_what_was_used_longest_ago_goes_first_and_what_has_just_been_made_stays_though_too_large(
+def test_the_least_recently_used_file_is_deleted_first_and_the_newest_stays(
     monkeypatch,
 ) -> None:
     old = keep("old", age=20)
@@ -107,7 +107,7 @@ def test_without_a_home_results_are_kept_in_a_private_folder(
     assert folder.parent == tmp_path and folder.stat().st_mode & 0o077 == 0
 
 
-def test_a_private_folder_of_somebody_else_is_not_used(tmp_path: Path, monkeypatch) -> None:
+def test_a_private_folder_of_another_user_is_not_used(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     planted = tmp_path / f"ripple-sim-{os.getuid()}"
     planted.mkdir(mode=0o777)
@@ -134,7 +134,7 @@ def test_a_full_disk_costs_the_next_call_its_time_and_leaves_nothing(tmp_path: P
     assert fill_cache("full", tmp_path) == []
 
 
-def test_what_is_made_from_an_object_is_made_once_and_kept_while_the_object_lives():
+def test_a_result_for_an_object_is_computed_once_and_kept_while_the_object_lives():
     class Thing:
         pass
 

@@ -94,13 +94,13 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_the_error_names_argument_value_and_what_is_valid(case: str) -> None:
+def test_the_error_names_argument_value_and_expected_values(case: str) -> None:
     call, message = WRONG[case]
     with pytest.raises(RippleError, match=message):
         call()
 
 
-def test_what_was_refused_has_changed_nothing() -> None:
+def test_a_refused_call_changes_nothing() -> None:
     assert not WAVES.height.any()
     assert WAVES.time == 0.0
 

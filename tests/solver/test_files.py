@@ -178,7 +178,7 @@ def test_an_old_file_stays_as_it_was_where_writing_fails(
 
 
 @pytest.mark.parametrize("kind", ["folder", "pipe"])
-def test_what_is_not_a_regular_file_is_refused_and_left_alone(tmp_path: Path, kind: str) -> None:
+def test_special_files_are_refused_and_left_alone(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "taken"
     path.mkdir() if kind == "folder" else os.mkfifo(path)
     with pytest.raises(FileExistsError, match="not a regular file"), atomic_write(path):

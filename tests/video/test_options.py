@@ -88,14 +88,14 @@ def test_a_duration_or_slow_motion_out_of_range_is_named(
         ({"frame_format": "exr"}, "name a folder"),
     ],
 )
-def test_what_cannot_be_written_leaves_nothing(tmp_path: Path, options: dict, said: str) -> None:
+def test_a_refused_video_leaves_nothing(tmp_path: Path, options: dict, said: str) -> None:
     with pytest.raises(RippleError, match=said):
         check_options(VideoOptions(**options), tmp_path / "clip.mp4")
     check_options(VideoOptions(), tmp_path / "clip.mp4")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_same_scene_has_the_same_fingerprint_whatever_its_name_and_length() -> None:
+def test_the_fingerprint_of_a_scene_does_not_depend_on_name_and_length() -> None:
     digest = scene_digest(made())
     assert len(digest) == 16
     assert int(digest, 16) >= 0

@@ -28,7 +28,7 @@ OPTIONS = {"size": (64, 48), "fps": 30}
 
 
 @pytest.mark.parametrize("name", ["clip.mp4", "frames"])
-def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
+def test_a_resumed_render_makes_the_same_video(scene, tmp_path, name):
     whole = tmp_path / "whole" / name
     broken = tmp_path / "broken" / name
     # with sound, which is heard from where the camera is at each frame
@@ -50,9 +50,7 @@ def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
     assert contents(broken.parent) == contents(whole.parent)
 
 
-def test_waves_lower_than_a_pixel_are_told_of_and_the_density_that_is_named_shows_them(
-    scene, tmp_path
-):
+def test_warning_about_invisible_waves_names_a_density_that_shows_them(scene, tmp_path):
     def rendered(density: float, **options: object) -> list[str]:
         target = msgspec.structs.replace(
             scene.targets[0], material=MaterialEntry(density=density, stiffness=1e3)
@@ -73,7 +71,7 @@ def test_waves_lower_than_a_pixel_are_told_of_and_the_density_that_is_named_show
 @pytest.mark.parametrize(
     ("beside", "duration", "lines"), [(0.0, None, 0), (5.0, None, 1), (5.0, 0.3, 0)]
 )
-def test_a_target_that_nothing_touches_in_the_whole_scene_is_told_of(
+def test_warning_about_a_target_that_nothing_touches_in_the_whole_scene(
     tmp_path, opengl, beside, duration, lines
 ):
     egg_scene(tmp_path, duration=0.5)
@@ -222,7 +220,9 @@ def test_an_error_comes_where_the_next_item_would_have_come():
     assert taken == [1, 2]
 
 
-def test_every_frame_has_its_passes_whatever_the_exposures(scene: Scene, tmp_path: Path) -> None:
+def test_every_frame_has_its_passes_with_any_number_of_exposures(
+    scene: Scene, tmp_path: Path
+) -> None:
     options = {"size": (32, 24), "fps": 20, "duration": 0.2}
     blur = {"shutter": 180.0, "exposures": 2}
     passes = ("depth", "flow")
@@ -328,7 +328,7 @@ def test_a_camera_that_the_model_lacks_is_refused_before_anything_is_written(
 
 
 @pytest.mark.parametrize("name", ["progress", "on_step", "on_frame"])
-def test_what_is_called_must_be_a_function(scene: Scene, tmp_path: Path, name: str) -> None:
+def test_callbacks_must_be_functions(scene: Scene, tmp_path: Path, name: str) -> None:
     with pytest.raises(
         VideoError, match=f"^{name.replace('_', ' ')} must be a function, or None, got 3$"
     ):

@@ -159,7 +159,7 @@ def test_other_machines_are_let_in_by_their_users_choice_alone() -> None:
     assert web.address("::1", 80, "s1") == "http://[::1]:80/?secret=s1"
 
 
-def test_what_is_exposed_is_said_in_one_line(tmp_path: Path) -> None:
+def test_one_line_warns_of_an_exposed_viewer(tmp_path: Path) -> None:
     line = web.exposure("0.0.0.0", tmp_path)
     assert "\n" not in line
     for word in ("--host 0.0.0.0", "sees and drives", str(tmp_path), "nothing is encrypted"):

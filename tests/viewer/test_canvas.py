@@ -152,7 +152,7 @@ def test_a_steep_camera_keeps_its_distance_and_direction_at_88_degrees(offset: l
 
 
 @pytest.mark.parametrize("height", [4.0, -4.0])
-def test_a_camera_straight_above_or_below_keeps_what_was_up_in_the_frame(height: float) -> None:
+def test_a_camera_straight_above_or_below_keeps_its_up_direction(height: float) -> None:
     made = camera([0, 0, height], up=(0.6, 0.8, 0.0))
     level(made)
     assert elevation(made) == pytest.approx(np.copysign(88.0, height))

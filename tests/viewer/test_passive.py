@@ -18,7 +18,7 @@ def test_on_a_screen(screen: str) -> None:
     assert result.returncode == 0, result.stdout + result.stderr
 
 
-def test_without_a_display_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_without_a_display_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><worldbody><geom name="ball" size="1"/></worldbody></mujoco>'

@@ -124,7 +124,7 @@ def test_colours_follow_the_waves_at_once_and_fade_slowly(session: Session) -> N
     assert 0.9 * high < session.color_range < high
 
 
-def test_what_becomes_unstable_is_paused_and_can_start_again(
+def test_an_unstable_run_is_paused_and_can_restart(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -134,7 +134,7 @@ def test_tiles_cover_the_boxes_once_and_little_more() -> None:
     assert not len(touched_tiles(boxes[:0], (200, 120)))
 
 
-def test_a_transparent_geom_shows_what_is_behind_it(gl):
+def test_a_transparent_geom_shows_the_objects_behind_it(gl):
     wall = '<geom type="box" size="3 .1 3" pos="0 2 0" rgba="0 0 1 1"/>'
     glass = '<geom type="box" size=".5 .02 .5" pos="0 0 .5" rgba="1 0 0 {}"/>'
     middle = np.s_[55:65, 75:85]
@@ -150,7 +150,7 @@ def test_a_transparent_plane_is_drawn_too(gl):
     assert (frame_of(gl, FLOOR + pane) - frame_of(gl, FLOOR))[60, 80, 2] < -40
 
 
-def test_water_shows_what_is_behind_it_and_clay_does_not(gl):
+def test_water_shows_the_objects_behind_it_and_clay_does_not(gl):
     """A wall behind the ball tints the middle of the frame through a clear body alone."""
 
     def middle(look: str, rgba: str) -> np.ndarray:

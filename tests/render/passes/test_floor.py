@@ -207,7 +207,7 @@ def test_the_interpolated_background_is_that_of_each_pixel(gl, monkeypatch, lamp
     ],
     ids=["wide", "transparent"],
 )
-def test_interpolated_penumbras_end_where_those_of_each_pixel_do(gl, monkeypatch, solid):
+def test_interpolated_and_exact_penumbras_end_at_the_same_place(gl, monkeypatch, solid):
     body = '<geom type="plane" size="0 0 .1" rgba=".8 .7 .6 1"/>' + solid
     camera = Camera((0, 0, 0.2), 1.3, 110.0, -22.0)
     interpolated, exact = backgrounds(gl, monkeypatch, (803, 451), body, camera=camera)

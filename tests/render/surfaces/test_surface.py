@@ -174,7 +174,7 @@ def test_a_long_triangle_over_a_corner_of_the_cube_has_a_part_in_each_chart_ther
 COLORS = np.arange(9, dtype=np.uint8).reshape(3, 3)
 
 
-def test_what_is_no_heatmap_is_refused(gl) -> None:
+def test_invalid_heatmaps_are_refused(gl) -> None:
     model = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><geom size='.5'/><geom size='.1'/></worldbody></mujoco>"
     )

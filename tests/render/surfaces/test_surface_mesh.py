@@ -152,7 +152,7 @@ def test_vertices_move_along_their_direction_and_then_into_the_world(resources):
 
 
 @pytest.mark.parametrize("used", [[], [67], [69, 64, 66]])
-def test_of_the_midpoints_only_those_in_use_are_displaced(resources, used):
+def test_only_midpoints_in_use_are_displaced(resources, used):
     chart, uv = random_places(70, 5)
     height_map = random_height_map(5)
     vertices = vertices_at(chart, uv, midpoints=6)

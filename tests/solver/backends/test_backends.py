@@ -192,7 +192,7 @@ def hardware(opengl: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> G
     backend_speed.measured.cache_clear()
 
 
-def test_auto_takes_what_was_measured_to_be_faster(
+def test_auto_takes_the_backend_that_was_measured_to_be_faster(
     hardware: GLContext, operator: WaveOperator, monkeypatch
 ):
     """A GPU that takes 1 ms for any number of texels, a processor that takes 1 ms for 4,000."""

@@ -53,7 +53,7 @@ def test_running_out_of_memory_is_one_clear_error(gl_backend: str) -> None:
         pass  # the error does not linger
 
 
-def test_what_moderngl_raises_becomes_one_error(gl_backend: str) -> None:
+def test_errors_of_moderngl_become_one_error(gl_backend: str) -> None:
     with pytest.raises(GLError, match="OpenGL failed on"), shared_context() as ctx:
         ctx.buffer(b"1234").read(size=8)
 
@@ -125,7 +125,7 @@ def test_a_thread_that_never_leaves_the_context_is_named(
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_a_fork_is_told_to_be_spawned_and_auto_takes_the_cpu(opengl: None) -> None:
+def test_a_fork_is_refused_with_advice_and_auto_takes_the_cpu(opengl: None) -> None:
     script = """
         import os, sys
         from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
@@ -166,7 +166,7 @@ GPU = [AMD, INTEL, "NVIDIA H200/PCIe/SSE2", "Apple M1", "D3D12 (NVIDIA GeForce R
 
 
 @pytest.mark.parametrize("renderer", PROCESSOR + GPU)
-def test_software_drivers_are_told_by_their_name(renderer: str) -> None:
+def test_software_drivers_are_recognised_by_name(renderer: str) -> None:
     assert is_software(renderer) == (renderer in PROCESSOR)
 
 
@@ -246,7 +246,7 @@ NO_DEVICES = "requested device index 0, but found 0 devices"
 
 
 @pytest.mark.parametrize(("reason", "devices"), [(NO_DEVICES, 8), ("libEGL.so not loaded", 1)])
-def test_without_any_device_the_error_says_what_to_install(
+def test_the_error_without_any_device_names_the_packages_to_install(
     monkeypatch, reason: str, devices: int
 ) -> None:
     """A library that cannot be loaded is not asked again for every device."""
@@ -276,7 +276,7 @@ def test_a_driver_that_is_too_old_is_named_with_its_version_and_the_one_needed(
 
 
 @pytest.mark.parametrize("system", ["darwin", "win32"])
-def test_a_system_that_has_no_context_is_told_what_runs(
+def test_the_error_without_a_context_names_the_features_that_work(
     system: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.platform", system)
@@ -306,7 +306,7 @@ def is_freed(created: Any) -> bool:
     return type(created.mglo).__name__ == "InvalidObject"
 
 
-def test_what_is_discarded_in_the_middle_of_a_frame_is_freed_at_the_next_entry_from_outside(
+def test_objects_discarded_during_a_frame_are_freed_at_the_next_entry(
     opengl: None,
 ) -> None:
     gl = shared_context()
@@ -339,7 +339,7 @@ def test_freeing_in_a_thread_does_not_wait_for_another_that_draws(opengl: None) 
         assert is_freed(buffer)
 
 
-def test_python_looks_for_no_garbage_in_a_frame_so_that_no_finalizer_of_others_leaves_the_context(
+def test_garbage_collection_is_off_during_a_frame(
     opengl: None,
 ) -> None:
     """MuJoCo's contexts release all that the thread has current, when they are collected."""
@@ -470,7 +470,7 @@ def test_a_missing_file_is_named_and_a_shader_starts_with_its_version(package: s
             load_shader(package, f"passes/{name}")
 
 
-def test_a_stage_is_what_stands_before_all_and_its_own_part(package: str, tmp_path: Path) -> None:
+def test_a_stage_has_the_common_source_and_its_own_part(package: str, tmp_path: Path) -> None:
     folder = tmp_path / "some_shaders"
     (folder / "rays.glsl").write_text("all\n#stage vertex\ncast\n#stage fragment\nmeet\n")
     text = '#version 430\n#include "rays.glsl"\n#stage fragment\nshade\n#stage vertex\nplace\n'

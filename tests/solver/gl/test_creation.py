@@ -17,7 +17,7 @@ def test_driver_that_draws_nothing_is_refused(
             creation._check_first_picture(ctx)
 
 
-def test_without_egl_and_display_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_without_egl_and_display_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(creation, "egl_exists", lambda: False)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setenv("DISPLAY", ":987")  # there is no such display

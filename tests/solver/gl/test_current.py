@@ -86,7 +86,7 @@ def test_our_context_is_left_even_where_an_interrupted_entry_left_it_current(ope
     assert current_context() is None
 
 
-def test_somebody_who_takes_the_context_away_while_it_draws_is_reported(opengl: None) -> None:
+def test_a_renderer_that_takes_the_context_away_during_a_frame_is_reported(opengl: None) -> None:
     """MuJoCo's renderers release the thread's context whenever they are collected."""
     with (
         pytest.raises(GLError, match=r"was left while it drew.*Close other renderers"),

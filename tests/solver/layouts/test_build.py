@@ -181,7 +181,7 @@ def test_a_hard_shape_gives_the_same_bits_again() -> None:
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
-def test_charts_that_take_long_are_told_of(
+def test_charts_that_take_long_are_logged(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     build = sys.modules[build_atlas.__module__]

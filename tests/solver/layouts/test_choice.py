@@ -87,7 +87,7 @@ def test_round_bodies_and_shipped_ones_get_the_cube(mesh) -> None:
     assert texel_length(atlas.mesh, atlas.sphere) < 0.9 * LONGEST_TEXEL
 
 
-def test_limbs_get_patches_and_the_atlas_says_why(crab: Mesh, crab_atlas: Atlas) -> None:
+def test_limbs_get_patches_with_a_reason_in_the_notes(crab: Mesh, crab_atlas: Atlas) -> None:
     assert crab_atlas.layout == "patches"
     [note] = crab_atlas.notes
     assert "times as long as wide" in note
@@ -143,7 +143,7 @@ def test_notes_are_saved(crab_atlas: Atlas, tmp_path: Path) -> None:
     assert load_atlas(tmp_path / "crab.npz").notes == crab_atlas.notes
 
 
-def test_who_gives_a_sphere_map_gets_the_cube(crab: Mesh) -> None:
+def test_a_given_sphere_map_makes_a_cube_layout(crab: Mesh) -> None:
     known = build_atlas(crab, 8, cache=False, layout="cube").sphere
     assert build_atlas(crab, 8, cache=False, sphere=known).layout == "cube"
 

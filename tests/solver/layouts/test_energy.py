@@ -61,7 +61,7 @@ def test_small_areas_meet_a_wall_of_the_sixteenth_power():
 
 
 @pytest.mark.parametrize("d, j", [(2.0, 0.7), (3.0, 1.3), (5.0, 0.2)])
-def test_but_for_the_wall_a_map_costs_as_much_as_its_inverse(d: float, j: float):
+def test_a_map_and_its_inverse_cost_the_same_without_the_wall(d: float, j: float):
     without = SPHERE._replace(small=0.0)
     assert energy_density(d, 1 / j, without) == pytest.approx(
         energy_density(d / j**2, j, without), rel=1e-13
@@ -169,7 +169,7 @@ def test_tangent_frame_is_orthonormal_and_right_handed(p):
 
 
 @pytest.mark.parametrize("backwards", [False, True])
-def test_a_sweep_lowers_the_energy_by_what_it_says(backwards):
+def test_a_sweep_lowers_the_energy_by_the_returned_amount(backwards):
     V, F = crumpled()
     level, reference = whole_level(V, F)
     S = icosphere(3)[0]

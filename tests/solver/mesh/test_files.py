@@ -279,7 +279,7 @@ def refusal(path: Path) -> str:
         ),
     ],
 )
-def test_what_cannot_be_read_is_said_in_one_line(
+def test_unreadable_files_are_refused_in_one_line(
     tmp_path: Path, name: str, content, said: str
 ) -> None:
     message = refusal(written(tmp_path, name, content))
@@ -317,7 +317,7 @@ def test_a_place_without_permission_is_named(
     assert "Permission denied" in refusal(path)
 
 
-def test_nothing_but_the_error_is_said(tmp_path: Path) -> None:
+def test_the_error_is_the_only_output(tmp_path: Path) -> None:
     broken = (
         trimesh.creation.box().export(file_type="stl_ascii").replace("normal 0", "normal zero", 1)
     )

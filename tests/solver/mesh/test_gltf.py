@@ -34,7 +34,7 @@ def test_lists_strips_and_fans_are_the_same_square(tmp_path: Path, mode: int, in
     assert (normals[:, 2] > 0).all()
 
 
-def test_points_and_lines_are_left_out_and_told_of(tmp_path: Path) -> None:
+def test_points_and_lines_are_left_out_with_a_note(tmp_path: Path) -> None:
     file = Gltf()
     file.show(file.primitive(), *(file.primitive(5 * SQUARE, None, mode) for mode in (0, 1, 3)))
     mesh = load_mesh(file.write(tmp_path / "a.glb"))
@@ -213,7 +213,7 @@ def test_data_of_uris_and_of_files_beside(tmp_path: Path) -> None:
         assert len(load_mesh(tmp_path / f"{number}.gltf").F) == 2
 
 
-def test_required_extensions_that_are_not_read_are_told_of(tmp_path: Path) -> None:
+def test_unsupported_required_extensions_are_named(tmp_path: Path) -> None:
     file = Gltf(extensionsRequired=["VENDOR_shape", "KHR_mesh_quantization"], animations=[{}])
     file.show(file.primitive())
     notes = load_mesh(file.write(tmp_path / "a.glb")).notes

@@ -100,7 +100,7 @@ def test_several_libraries_in_a_line_and_one_with_blanks_in_its_name(tmp_path: P
         ("newmtl m\n", "mtllib gone.mtl\nusemtl m\n", ()),  # its own name with .mtl
     ],
 )
-def test_what_is_lost_of_the_materials_is_told(tmp_path: Path, mtl, head, said) -> None:
+def test_lost_properties_of_materials_are_named(tmp_path: Path, mtl, head, said) -> None:
     assert square(tmp_path, mtl, head).looks.notes == said
 
 

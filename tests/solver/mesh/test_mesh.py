@@ -68,7 +68,7 @@ def test_the_normal_of_a_spike_points_outwards_of_the_one_triangle_that_faces_el
         (lambda V, F: (V, F[:0]), "m > 0"),
     ],
 )
-def test_what_is_no_surface_is_refused_by_name(damage, name: str) -> None:
+def test_meshes_that_are_no_surfaces_are_refused_by_name(damage, name: str) -> None:
     with pytest.raises(MeshError, match=name):
         Mesh.from_arrays(*damage(*cube()))
 

@@ -58,7 +58,7 @@ def test_heights_follow_size_and_place_of_the_mesh(size: float, offset: list[flo
     )
 
 
-def test_rays_of_libigl_hit_what_those_of_embree_hit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rays_of_libigl_and_embree_hit_the_same_triangles(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("embreex")
     solid = trimesh.creation.annulus(0.4, 1.0, 0.5, sections=24)
     V, F = np.array(solid.vertices), np.array(solid.faces)

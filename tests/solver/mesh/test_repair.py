@@ -68,7 +68,7 @@ class TestRepair:
         np.testing.assert_allclose(np.ptp(mesh.V, axis=0), np.ptp(before.V, axis=0))
         assert sum(note.startswith("hole closed: ") for note in mesh.notes) == 6
 
-    def test_a_single_triangle_stays_open_and_that_is_said(self) -> None:
+    def test_a_single_triangle_stays_open_with_a_note(self) -> None:
         mesh = repaired(Soup(np.eye(3), np.array([[0, 1, 2]])), "tile")
         assert not mesh.closed
         assert mesh.notes == ("1 rim left open, where a lid would lie on other triangles",)
@@ -81,12 +81,12 @@ class TestRepair:
         with pytest.raises(MeshError, match=r"ball: pymeshfix cannot repair it \(it failed\)$"):
             repaired(Soup(np.array(BALL.vertices), np.array(BALL.faces)[1:]), "ball")
 
-    def test_what_is_hopeless_is_refused(self) -> None:
+    def test_meshes_beyond_repair_are_refused(self) -> None:
         with pytest.raises(MeshError, match="nothing is left"):
             repaired(Soup(np.full((3, 3), np.nan), np.array([[0, 1, 2]])), "dust")
 
 
-def test_without_pymeshfix_the_message_says_what_to_install(
+def test_the_error_without_pymeshfix_names_the_package_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "pymeshfix", None)

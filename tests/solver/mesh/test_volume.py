@@ -89,7 +89,7 @@ def test_an_array_of_numpy_takes_its_spacing_and_place_from_the_caller(tmp_path:
         np.testing.assert_allclose(mine, other, atol=1e-12)
 
 
-def test_what_is_no_volume_is_refused_with_what_is_valid(
+def test_invalid_volumes_are_refused_with_the_expected_values(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     np.save(tmp_path / "plain.npy", np.zeros((2, 2, 2)))

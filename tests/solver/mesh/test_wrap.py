@@ -28,7 +28,7 @@ def test_a_ball_gets_a_larger_ball() -> None:
     np.testing.assert_allclose(distances(found), 1, atol=0.1)
 
 
-def test_bodies_that_pass_through_each_other_get_one_surface_without_what_lies_inside() -> None:
+def test_bodies_that_intersect_get_one_outer_surface() -> None:
     found = wrap(
         joined(sphere(3), moved(sphere(3), (1, 0, 0)), moved(sphere(3), (0.4, 0.3, 0), 0.4)), 0.03
     )

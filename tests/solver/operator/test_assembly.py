@@ -51,7 +51,7 @@ def test_needles_do_not_set_the_time_step_of_all() -> None:
     assert steps[1] > 0.9 * steps[0]
 
 
-def test_a_narrow_ring_stays_as_stiff_as_it_is() -> None:
+def test_a_narrow_ring_is_not_softened() -> None:
     # one column of squares 0.55 of the others' width, which are 4.5 times as long as wide: all that
     # crosses a thin limb
     n = 192

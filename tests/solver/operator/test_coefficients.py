@@ -72,7 +72,7 @@ FIRST_WRONG = np.array([[[1.0, -2.5], [np.nan, 1.0]]])
         ),
     ],
 )
-def test_what_is_refused_is_named_with_what_is_valid(
+def test_invalid_coefficients_are_refused_with_the_expected_values(
     check, name: str, value: object, said: str
 ) -> None:
     check_numbers("yield_height", np.inf)  # alone may be infinite

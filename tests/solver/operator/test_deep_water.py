@@ -23,7 +23,9 @@ def root(atlas: Atlas) -> HalfLaplacian:
     return HalfLaplacian(atlas.texels.stencil(np.ones_like(atlas.areas)), atlas.areas)
 
 
-def test_it_is_the_dense_root_within_a_thousandth(atlas: Atlas, root: HalfLaplacian) -> None:
+def test_the_operator_is_the_dense_root_within_a_thousandth(
+    atlas: Atlas, root: HalfLaplacian
+) -> None:
     matrix = stiffness_matrix(atlas.texels.stencil(np.ones_like(atlas.areas))).toarray()
     squares, modes = eigh(matrix, np.diag(atlas.areas.ravel()))
     for k in (1, 5, 40, 300, len(squares) - 1):
@@ -33,7 +35,7 @@ def test_it_is_the_dense_root_within_a_thousandth(atlas: Atlas, root: HalfLaplac
     assert root.most == pytest.approx(np.sqrt(squares[-1]), rel=0.01)
 
 
-def test_it_is_symmetric_and_gives_nothing_of_a_constant(atlas: Atlas, root: HalfLaplacian) -> None:
+def test_the_operator_is_symmetric_and_0_on_constants(atlas: Atlas, root: HalfLaplacian) -> None:
     a, b = np.random.default_rng(0).normal(size=(2, *atlas.areas.shape))
     forth = (atlas.areas * a * root(b)).sum()
     back = (atlas.areas * b * root(a)).sum()
@@ -93,7 +95,7 @@ def test_waves_die_as_the_viscosity_wants_them_to(torus: Atlas) -> None:
     assert rate == pytest.approx(2 * viscosity * q**2, rel=0.03)
 
 
-def test_energy_and_volume_stay_and_a_copy_goes_on_as_the_original(torus: Atlas) -> None:
+def test_energy_and_volume_stay_and_a_copy_continues_like_the_original(torus: Atlas) -> None:
     waves = WaveSolver(torus, water(10.0, 1.0), backend="cpu", conserve_volume=False)
     waves.add_impulse([0.3, 0.4, 0.0], 5.0, 0.12)
     waves.step(waves.stable_timestep)
@@ -148,7 +150,9 @@ def test_held_parts_stay_and_reflect(torus: Atlas) -> None:
     ],
     ids=["bending", "yield", "density", "map", "negative"],
 )
-def test_what_a_fluid_cannot_do_is_refused(coefficients: dict, message: str) -> None:
+def test_materials_that_a_fluid_does_not_support_are_refused(
+    coefficients: dict, message: str
+) -> None:
     with pytest.raises(SolverError, match=message):
         WaveSolver(
             sphere_atlas(1.0, 8),

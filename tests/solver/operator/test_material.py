@@ -86,7 +86,7 @@ def test_stiffness_and_both_dampings_are_those_of_theory(degree: int) -> None:
     assert abs(amplitude(material, degree, 200.0, n=16)) < 0.02
 
 
-def test_dent_leaves_what_energy_beyond_the_yield_height_pays_for() -> None:
+def test_a_dent_has_the_size_that_the_energy_beyond_the_yield_height_gives() -> None:
     k = 400.0
     limit = 0.01
     v = 1.0

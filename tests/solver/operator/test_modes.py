@@ -103,7 +103,7 @@ def test_a_layer_of_few_texels_rings_at_its_frequency_at_the_longest_substeps(
     assert angular / (2 * np.pi) == pytest.approx(found.frequencies[0], rel=0.005)
 
 
-def test_modes_of_one_frequency_are_those_that_uneven_damping_does_not_mix(ball: Atlas) -> None:
+def test_modes_of_one_frequency_are_not_mixed_by_uneven_damping(ball: Atlas) -> None:
     uneven = 1 + (ball.positions[..., 0] / RADIUS) ** 2
     found = modes(ball, Material(speed=1.0, damping=0.1 * uneven), 3)
     # means of x^4 over x^2, and of x^2 y^2 over y^2: 3/5 and 1/5
@@ -112,7 +112,7 @@ def test_modes_of_one_frequency_are_those_that_uneven_damping_does_not_mix(ball:
     )
 
 
-def test_what_creeps_back_has_no_frequency_and_its_slow_time(ball: Atlas) -> None:
+def test_an_overdamped_mode_has_no_frequency_and_its_slow_decay_time(ball: Atlas) -> None:
     found = modes(ball, Material(speed=1.0, damping=40.0), 3)
     assert not found.frequencies.any()
     np.testing.assert_allclose(
@@ -120,7 +120,7 @@ def test_what_creeps_back_has_no_frequency_and_its_slow_time(ball: Atlas) -> Non
     )
 
 
-def test_what_does_not_move_has_no_height(ball: Atlas) -> None:
+def test_modes_are_0_on_fixed_texels(ball: Atlas) -> None:
     right = ball.positions[..., 0] > 0.2
     left = ball.positions[..., 0] < -0.2
     found = modes(ball, Material(speed=np.where(left, 0.0, 1.0), fixed=right), 5)
@@ -129,7 +129,7 @@ def test_what_does_not_move_has_no_height(ball: Atlas) -> None:
 
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, 10**6, None])
-def test_a_wrong_count_is_told_with_what_is_valid(ball: Atlas, count: object) -> None:
+def test_a_wrong_count_is_refused_with_the_range(ball: Atlas, count: object) -> None:
     with pytest.raises(
         SolverError, match=r"count of modes must be a whole number from 1 to 134, got"
     ):

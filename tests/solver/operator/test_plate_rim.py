@@ -241,7 +241,7 @@ def test_a_free_plate_keeps_its_momentum(sheet) -> None:
     assert waves.momentum() == pytest.approx(-1.0, rel=1e-4)
 
 
-def test_a_membrane_is_held_where_the_function_says_so(sheet) -> None:
+def test_a_function_chooses_where_a_membrane_is_held(sheet) -> None:
     # as the rim of a drum on two sides: sin in between, even along them
     def rim(points: np.ndarray) -> list[str]:
         return ["supported" if x < 1e-6 or x > 1 - 1e-6 else "free" for x in points[:, 0]]
@@ -266,6 +266,6 @@ def test_a_plate_that_is_turned_rings_as_before(sheet) -> None:
 @pytest.mark.parametrize(
     "wrong", ["bent", 3, lambda points: "free", lambda points: ["bent"] * len(points)]
 )
-def test_what_is_no_rim_is_refused(wrong, sheet) -> None:
+def test_invalid_rims_are_refused(wrong, sheet) -> None:
     with pytest.raises(SolverError, match=r"must .*'free', 'supported'"):
         WaveSolver(sheet, PLATE, backend="cpu", rim=wrong)

@@ -70,7 +70,7 @@ def test_a_body_and_its_impulse_are_the_same_hit_unless_it_is_too_heavy_to_rest(
         (1.0, (1.0, 2.0, 3.0), "must be an impulse"),
     ],
 )
-def test_what_is_no_size_and_no_hit_is_refused(size: float, hit: object, message: str) -> None:
+def test_invalid_sizes_and_hits_are_refused(size: float, hit: object, message: str) -> None:
     with pytest.raises(SolverError, match=message):
         Material.suited(size, hit)
 

@@ -82,7 +82,7 @@ def test_keeping_the_volume_costs_no_energy() -> None:
     assert abs(free.volume()) > 0.1 * (free.atlas.areas * np.abs(free.height)).sum()
 
 
-def test_what_is_done_to_one_part_of_a_mesh_leaves_the_others_at_rest(backend: str) -> None:
+def test_sources_on_one_part_of_a_mesh_leave_other_parts_at_rest(backend: str) -> None:
     atlas = texel_atlas(two_squares(12))
     waves = WaveSolver(atlas, Material(speed=1.0), backend=backend)
     waves.add_impulse([0.3, 0.4, 1.0], 1.0, 0.2)
@@ -150,7 +150,7 @@ def columns(*values: float) -> np.ndarray:
     return np.broadcast_to(np.repeat(values, 12 // len(values)), (1, 12, 12)).copy()
 
 
-def test_what_springs_or_a_clamp_hold_is_one_part() -> None:
+def test_springs_or_a_clamp_hold_one_part_alone() -> None:
     speed = columns(1, 1, 0, 1)
     assert parts(square(12), speed=speed, stiffness=5.0) is None
     held_left = columns(1, 0, 0, 0) > 0
@@ -249,7 +249,7 @@ def test_volume_is_kept_by_default_where_a_surface_is_closed_or_nothing_holds_it
     assert waves.conserve_volume == any(kept)
 
 
-def test_what_conserve_volume_may_be_is_said() -> None:
+def test_invalid_conserve_volume_is_refused() -> None:
     with pytest.raises(SolverError, match="conserve_volume must be True, False or None"):
         WaveSolver(SHEET, backend="cpu", conserve_volume="auto")
 

@@ -68,14 +68,14 @@ def test_a_truncated_file_is_named_as_damaged(
         read_atlas_file(path)
 
 
-def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_have_different_errors(tmp_path: Path) -> None:
     with pytest.raises(AtlasError, match=r"none\.atlas' does not exist; make one with"):
         read_atlas_file(tmp_path / "none.atlas")
     with pytest.raises(AtlasError, match="is not a file; make one with"):
         read_atlas_file(tmp_path)
 
 
-def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path: Path, arrays) -> None:
+def test_a_file_that_cannot_be_written_is_named_and_leaves_nothing(tmp_path: Path, arrays) -> None:
     folder = tmp_path / "folder.atlas"
     folder.mkdir()
     with pytest.raises(

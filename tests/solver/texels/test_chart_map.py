@@ -31,7 +31,7 @@ def test_on_a_flat_square_texture_coordinates_are_the_points_themselves() -> Non
     )
 
 
-def test_what_is_linear_in_a_triangle_is_carried_to_its_parts() -> None:
+def test_linear_functions_in_a_triangle_are_kept_on_its_pieces() -> None:
     mesh = Mesh(*icosphere(1))
     found = texture_coordinates(CubeChartMap(mesh.V), mesh)
     assert len(found.triangle) > len(mesh.F)

@@ -90,7 +90,7 @@ def test_a_bent_quad_weighs_as_much_as_the_flat_one() -> None:
     assert np.abs(chords - exact).max() > 0.05
 
 
-def test_no_detours_whatever_make_a_quad_that_gives_energy_away() -> None:
+def test_no_detours_make_a_quad_with_negative_energy() -> None:
     rng = np.random.default_rng(2)
     e, n, p = rng.standard_normal((3, 3, 3000))
     weights = np.array(quad(e, n, p, 4 * rng.uniform(size=(6, 3000)) ** 4)[:6])
@@ -144,7 +144,7 @@ def test_the_stiffness_stays_symmetric_and_holds_no_constant(layout: str) -> Non
     assert values[0] > -1e-12 * values[-1] and values[1] > 1e-3 * values[-1] / atlas.areas.size
 
 
-def test_charts_agree_on_the_length_of_what_they_share_to_the_last_bit() -> None:
+def test_charts_agree_on_shared_lengths_to_the_last_bit() -> None:
     atlas = build_atlas(tetrahedron(), 6, cache=False, layout="patches")
     topology = atlas.texels.topology
     known = {}

@@ -53,7 +53,7 @@ def test_an_image_lands_where_its_coordinates_say(globe: Atlas, tmp_path: Path) 
     np.testing.assert_allclose(falling[inside], (2 - 3 * expected)[inside], atol=0.015)
 
 
-def test_channels_are_told_apart(globe: Atlas, tmp_path: Path) -> None:
+def test_channels_of_an_image_are_selected_by_name(globe: Atlas, tmp_path: Path) -> None:
     path = tmp_path / "color.png"
     Image.new("RGBA", (4, 4), (51, 102, 204, 255)).save(path)
     for channel, value in {

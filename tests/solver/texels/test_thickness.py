@@ -27,7 +27,7 @@ def test_of_a_sphere_they_are_the_radius_at_any_scale(radius: float) -> None:
     np.testing.assert_allclose(medial_radius(atlas), radius, rtol=2e-3)
 
 
-def test_of_a_slab_it_is_half_its_thickness_up_to_the_edges() -> None:
+def test_the_medial_radius_of_a_slab_is_half_its_thickness() -> None:
     solid = trimesh.creation.box(extents=(1, 1, 0.2)).subdivide_to_size(0.1)
     atlas = build_atlas(Mesh.from_arrays(solid.vertices, solid.faces), 32, cache=False)
     flat = np.abs(atlas.normals[..., 2]) > 0.99
@@ -97,7 +97,7 @@ def test_rays_that_miss_get_the_greatest_thickness_and_a_warning() -> None:
     assert thickness.max() < 1.4
 
 
-def test_what_comes_out_of_the_surface_leaves_no_layer() -> None:
+def test_an_inner_body_that_reaches_out_leaves_no_layer() -> None:
     atlas = sphere_atlas(1.0, 32)
     large = Mesh.from_arrays(
         *polygonise(sphere((0.0, 0.0, 0.6), 0.6), ((-0.8, -0.8, -0.2), (0.8, 0.8, 1.4)), 0.05)

@@ -199,7 +199,7 @@ def test_charts_side_by_side_are_one_chart() -> None:
     )
 
 
-def test_what_does_not_fit_is_refused() -> None:
+def test_invalid_gluings_and_positions_are_refused() -> None:
     with pytest.raises(AtlasError, match="not glued back"):
         glue(np.array([[(0, 2), (0, 3), (0, 1), (0, 0)]]), 4)
     with pytest.raises(AtlasError, match=r"shape .*, got \(1, 4\)"):

@@ -48,7 +48,7 @@ def test_bad_values_are_named(call, message: str) -> None:
         call(WaveSolver(sphere_atlas(1.0, 8), backend="cpu"))
 
 
-def test_what_is_not_finite_is_reported_with_place_and_time(backend: str) -> None:
+def test_values_that_are_not_finite_are_reported_with_place_and_time(backend: str) -> None:
     atlas = sphere_atlas(1.0, 16)
     waves = WaveSolver(atlas, backend=backend)
     waves.step(0.5)

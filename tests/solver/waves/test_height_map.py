@@ -141,7 +141,7 @@ def test_heights_too_large_for_the_object_are_bent_as_on_the_host(hardware) -> N
     assert highest == pytest.approx(np.abs(host[..., 3]).max(), rel=1e-6)
 
 
-def test_a_snapshot_is_the_height_and_stays_while_the_waves_go_on(hardware) -> None:
+def test_a_snapshot_stays_while_the_waves_advance(hardware) -> None:
     material = Material(speed=1.0, yield_height=1e-4)
     waves = WaveSolver(sphere_atlas(0.1, N), material, backend="gl")
     waves.add_impulse((0.1, 0, 0), 1e-3, 0.05)

@@ -19,7 +19,7 @@ from ripple_sim.solver.waves import footprint_at
 from ripple_sim.solver.waves.footprint import footprint
 
 
-def test_load_acts_over_its_step_alone_beside_what_is_held(backend: str) -> None:
+def test_a_load_acts_over_its_step_beside_held_forces(backend: str) -> None:
     waves = WaveSolver(
         sphere_atlas(1.0, 16), Material(density=2.0), backend=backend, conserve_volume=False
     )

@@ -105,7 +105,7 @@ def test_folded_triangles_give_a_warning_and_no_nan():
     assert np.isfinite(waves.height).all()
 
 
-def test_copies_go_on_as_the_original_does():
+def test_copies_continue_like_the_original():
     waves = WaveSolver(ATLAS, Material(speed=1.0), backend="cpu")
     waves.add_impulse([0, 0, 1], 1.0, 0.3)
     waves.move(ATLAS.mesh.V * [1, 1, 1.5])

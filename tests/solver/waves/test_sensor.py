@@ -173,7 +173,7 @@ def test_samples_do_not_depend_on_when_they_are_read_and_have_exact_times() -> N
     np.testing.assert_allclose(times, 0.3 + np.arange(len(times)) / 50, rtol=1e-15)
 
 
-def test_a_constant_stays_what_it_is_and_a_reset_begins_anew() -> None:
+def test_a_constant_stays_constant_and_a_reset_restarts() -> None:
     waves = WaveSolver(
         sphere_atlas(1.0, 16), Material(speed=1.0), backend="cpu", conserve_volume=False
     )

@@ -128,7 +128,7 @@ def bits(waves: WaveSolver) -> tuple[bytes, ...]:
 @pytest.mark.parametrize(
     "copied", [copy.copy, copy.deepcopy, lambda waves: pickle.loads(pickle.dumps(waves))]
 )
-def test_a_copy_goes_on_as_the_original_bit_for_bit(
+def test_a_copy_continues_like_the_original_bit_for_bit(
     backend: str, copied: Callable[[WaveSolver], WaveSolver]
 ) -> None:
     waves = hit(backend)
@@ -161,7 +161,7 @@ def test_a_dent_stays_to_the_last_bit_in_a_surface_that_does_not_yield(backend: 
     assert not elastic.dent.any()
 
 
-def test_what_is_clamped_or_rigid_takes_over_its_dent_alone(backend: str) -> None:
+def test_clamped_and_rigid_texels_keep_only_their_dent(backend: str) -> None:
     waves = hit(backend)
     z = waves.atlas.positions[..., 2]
     other = WaveSolver(

@@ -82,7 +82,7 @@ def test_neighbours_across_a_border_of_charts_are_neighbours_on_the_surface(atla
     assert quality["edge_max"] < 4 * np.sqrt(atlas.areas.max())
 
 
-def test_what_lies_beyond_a_rim_lies_on_it(atlas: Atlas) -> None:
+def test_places_beyond_a_rim_lie_on_the_rim(atlas: Atlas) -> None:
     topology = atlas.texels.topology
     if not topology.rim.any():
         assert atlas.mesh.closed

@@ -29,7 +29,7 @@ def test_certificate_catches_a_planted_fold():
     assert not certificate.valid
 
 
-def test_certificate_catches_what_covers_the_sphere_twice_or_inside_out():
+def test_the_certificate_refuses_maps_that_cover_twice_or_inside_out():
     V, F = icosphere(2)
     assert certify(F, -V).flipped == len(F)
     assert certify(F, -V).solid_angle == pytest.approx(-4 * np.pi)
