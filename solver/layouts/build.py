@@ -75,7 +75,7 @@ def load_atlas(path: str | Path) -> Atlas:
             f"atlas file {str(path)!r} lacks {error} or is of another layout; {ADVICE}"
         ) from error
     texels = TexelMesh(
-        glue(arrays["glued"], arrays["positions"].shape[1]),
+        glue(arrays["glued"], arrays["positions"].shape[1], arrays.get("still")),
         arrays["positions"],
         arrays["normals"],
         arrays["areas"],
@@ -235,7 +235,7 @@ class _Builder:
                 f"patches fail: {error}"
             )
         timings = {"sphere_map": mapped - start, **atlas.timings}
-        return dataclasses.replace(atlas, timings=timings, notes=(note,))
+        return dataclasses.replace(atlas, timings=timings, notes=(note, *atlas.notes))
 
     def _sphere_map(self, known: NDArray[np.float64] | None) -> NDArray[np.float64]:
         """The known sphere map after a check, or the method's if none is known."""
@@ -298,32 +298,41 @@ class _Builder:
 
 
 def _patches(mesh: Mesh, resolution: int) -> Atlas:
-    """Atlas of the patch layout, with messages while that takes long."""
-    with _progress_messages(mesh):
-        return patch_atlas(mesh, resolution)
+    """Atlas of the patch layout, with messages while that takes long, and of parts that lie still."""
+    with _progress_messages(mesh) as report:
+        atlas = patch_atlas(mesh, resolution, report)
+    for note in atlas.notes:
+        log.warning("%s: %s", mesh.name, note)
+    return atlas
 
 
 @contextlib.contextmanager
-def _progress_messages(mesh: Mesh) -> Iterator[None]:
-    """Log from time to time that charts are still being laid on a mesh."""
+def _progress_messages(mesh: Mesh) -> Iterator[Callable[[str], None]]:
+    """Log from time to time how far the charts of a mesh are; yields what is to be told that."""
     done = threading.Event()
+    stage = "beginning"
+
+    def report(text: str) -> None:
+        nonlocal stage
+        stage = text
 
     def log_until_done() -> None:
         waited = 0.0  # [s]
         while not done.wait(_MESSAGE_INTERVAL):
             waited += _MESSAGE_INTERVAL
             log.warning(
-                "laying charts on a mesh of %s in %s: %.0f s so far; later runs load what is made, "
-                "and a lower resolution takes less",
+                "laying charts on a mesh of %s in %s: %s, %.0f s so far; later runs load what is "
+                "made, and a lower resolution takes less",
                 counted(len(mesh.F), "triangle"),
                 counted(mesh.component_count, "part"),
+                stage,
                 waited,
             )
 
     logger = threading.Thread(target=log_until_done, daemon=True)
     logger.start()
     try:
-        yield
+        yield report
     finally:
         done.set()
         logger.join()

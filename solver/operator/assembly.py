@@ -150,6 +150,7 @@ def texel_fields(
     """
     field = {name: material.texels(name, atlas.areas.shape) for name in (*LIMITS, "fixed")}
     texels = atlas.texels
+    field["fixed"] = field["fixed"] | texels.topology.still[:, None, None]
     if fixed_rim:
         texels = texels.with_fixed_rim()
         field["fixed"] |= texels.bare_rim

@@ -215,6 +215,7 @@ class Atlas:
             "beyond": texels.beyond,
             "detours": texels.detours,
             "notes": notes,
+            "still": texels.topology.still if texels.topology.still.any() else None,
         }
         present = {name: array for name, array in optional.items() if array is not None}
         write_atlas_file(Path(path), arrays | present)

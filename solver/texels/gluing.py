@@ -63,7 +63,7 @@ def _fan(glued: Ints, chart: int, corner: int) -> tuple[list[tuple[int, int]], b
         fan.insert(0, (other, (side + 1) % 4))
 
 
-def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
+def glue(glued: NDArray[np.int64], n: int, still: NDArray[np.bool_] | None = None) -> TexelTopology:
     """Connect charts of n x n texels along their sides.
 
     Parameters
@@ -73,6 +73,8 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
         is glued back to the side itself.
     n : int
         Texels along a side.
+    still : bool [C], optional
+        Charts that lie still, none by default.
 
     Raises
     ------
@@ -111,9 +113,10 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
         )
         rim.reshape(charts, -1)[:, beyond[side]] = is_rim[:, None]
     valence, corners, polygons = close_corners(glued, n, halo, rim)
+    still = np.zeros(charts, bool) if still is None else np.asarray(still, bool)
     for array in (halo, rim, valence, corners):
         array.setflags(write=False)
-    return TexelTopology(glued, halo, rim, valence, corners, tuple(polygons))
+    return TexelTopology(glued, halo, rim, valence, corners, tuple(polygons), still)
 
 
 def _along_sides(along: Ints, width: int) -> Ints:

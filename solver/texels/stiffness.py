@@ -62,6 +62,7 @@ class TexelCells:
         self._shape = (charts, 4, n + 1, n + 1)
         self._special = special_cells(topology, halo_positions)
         self._whole = np.logical_and.reduce(at_corners((topology.halo >= 0) & ~topology.rim))
+        self._whole &= ~topology.still[:, None, None]
         extent = float(np.ptp(halo_positions[:, 1:-1, 1:-1], axis=(0, 1, 2)).max())
         self._scale = 1.0
         if extent > 0:

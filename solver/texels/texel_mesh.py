@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import warnings
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import MatrixRankWarning, spsolve
 
 from ..errors import AtlasError, shown
 from ..kernel import Floats, Ints
@@ -169,6 +170,7 @@ class TexelMesh:
             level = np.maximum(mean, 1e-300) / np.maximum(smoothed(topology, areas), 1e-300)
             change = np.clip(level, _LEAST_COVERED, _MOST_COVERED) / level
             areas = np.maximum(covered * change, _LEAST_AREA * mean)
+            areas[topology.still] = covered[topology.still]
         if (areas > 0).all():
             ones = np.ones_like(areas)
             areas = evened_areas(areas, cells.at_rest(ones, ones))
@@ -357,7 +359,12 @@ def _least_potential(matrix: csr_array, lack: Floats) -> Floats | None:
         inside = np.flatnonzero(touching)
         w[:] = 0
         if len(inside):
-            w[inside] = spsolve(matrix[inside][:, inside].tocsc(), lack[inside])
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("error", MatrixRankWarning)
+                    w[inside] = spsolve(matrix[inside][:, inside].tocsc(), lack[inside])
+            except MatrixRankWarning:  # all of a part: nothing beside it gives mass
+                return None
         before = touching
         round_off = 1e-9 * np.abs(lack[inside]).sum()
         touching = np.where(touching, w > 0, matrix @ w < lack - round_off)
@@ -380,8 +387,8 @@ def softening(texels: TexelMesh) -> Floats:
     """
     areas = texels.areas
     rate = texels.stencil(np.ones_like(areas)).absolute_sums() / areas
-    # the least rate to which softening may bring the faster ones
-    order = np.argsort(-rate.ravel())
+    # the least rate to which softening may bring the faster ones; texels without links have none
+    order = np.argsort(-rate.ravel())[: np.count_nonzero(rate)]
     rates = rate.ravel()[order]
     shares = (areas.ravel() / areas.mean())[order]
     lost = np.cumsum(shares) - rates * np.cumsum(shares / rates)  # [texels]
@@ -389,7 +396,8 @@ def softening(texels: TexelMesh) -> Floats:
     cheapest = float(rates[np.flatnonzero(lost <= allowed)[-1]])
     bulk = _bulk(rate.ravel(), areas.ravel())
     bound = min(cheapest, max(_NEEDLE * bulk, _even(areas)))
-    return np.minimum(1, max(bound, _FASTER * bulk) / rate)
+    bound = max(bound, _FASTER * bulk)
+    return np.divide(bound, rate, out=np.ones_like(rate), where=rate > bound)
 
 
 def _bulk(rates: Floats, areas: Floats) -> float:
@@ -404,7 +412,8 @@ def _bulk(rates: Floats, areas: Floats) -> float:
 
 def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
     """Figures of how good a texel mesh is; see `Atlas.quality`."""
-    edges = link_lengths(texels.topology, texels.halo_positions)[:, :2]  # not the diagonals
+    lengths = link_lengths(texels.topology, texels.halo_positions)
+    edges = lengths[~texels.topology.still, :2]  # not the diagonals
     edges = edges[np.isfinite(edges) & (edges > 0)]
     stencil = texels.stencil(np.ones(texels.shape), softening(texels))
     rate = largest_eigenvalue(
@@ -433,4 +442,4 @@ def folded_texels(texels: TexelMesh) -> int:
         # NaN, where there is no neighbour, is not below 0
         facing = np.cross(beside[k] - own, beside[(k + 1) % 4] - own)
         folded |= np.einsum("...k,...k->...", facing, texels.normals) < 0
-    return int(folded.sum())
+    return int(folded[~texels.topology.still].sum())

@@ -41,6 +41,8 @@ class TexelTopology:
     polygons : tuple of int64 [k]
         The cells that do not fit the nine-point stencil: the texels round each corner of five
         charts and more, and of three and more at a rim, counter-clockwise.
+    still : bool [C]
+        Charts that lie still: there are no cells between their texels.
     fixed_rim : bool
         Whether heights are 0 at rims. Otherwise rims are free, and a height beyond a rim is that of
         the texel beside it.
@@ -52,6 +54,7 @@ class TexelTopology:
     valence: NDArray[np.int64]
     corners: NDArray[np.int64]
     polygons: tuple[NDArray[np.int64], ...]
+    still: NDArray[np.bool_]
     fixed_rim: bool = False
 
     @property

@@ -25,11 +25,12 @@ from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import TexelTopology
 from ..energy import COLUMN, FIXED
 from .disks import signed_areas
-from .layout import PatchMap, patch_map
+from .layout import PatchMap, Report, patch_map, tell_nobody
 from .pieces import Pieces, chart_pieces, warped
 from .quads import CELLS
-from .samples import centres, untangled
+from .samples import Samples, centres, on_mesh, untangled
 from .seamless import Complex, SeamlessMap, follow, places_seen_from
+from .still import still_pieces, still_texels
 
 # Texels along the side of a chart, at least.
 _MIN_CHART_TEXELS = 4
@@ -266,14 +267,16 @@ def _draw_rims(
                 beyond[chart, row, column, j] = (1 - t) * V[a, j] + t * V[b, j]
 
 
-def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
+def patch_atlas(mesh: Mesh, resolution: int, report: Report = tell_nobody) -> Atlas:
     """Atlas of about 6 N^2 texels, for a resolution N.
 
     Raises `AtlasError` if the mesh cannot be laid out.
     """
     start = time.perf_counter()
-    patches = patch_map(mesh.V, mesh.F, cells_for(resolution))
+    texels = 6 * resolution**2
+    patches = patch_map(mesh.V, mesh.F, cells_for(resolution), texels, report)
     mapped = time.perf_counter()
+    report("putting texels on the surface")
     atlas = atlas_from_patch_map(mesh, patches, resolution)
     atlas.timings.update(patch_map=mapped - start, texels=time.perf_counter() - mapped)
     return atlas
@@ -296,6 +299,16 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
     if offsets.any():
         pieces = warped(pieces, offsets)
         beyond = positions_beyond(patches, topology, samples.positions)
+    detours = link_detours(mesh, topology, samples.triangles, samples.barycentrics)
+    if len(patches.still):
+        # one more chart, of which no side is glued to another
+        lies_still = np.append(np.zeros(len(glued), bool), True)
+        topology = glue(np.append(glued, np.full((1, 4, 2), -1), axis=0), n, lies_still)
+        samples = _with_still_texels(mesh, samples, patches.still)
+        pieces = _sorted(pieces, still_pieces(patches.still, len(glued)))
+        detours = np.pad(detours, ((0, 0), (0, 1), (0, 0), (0, 0)))
+        if beyond is not None:
+            beyond = np.pad(beyond, ((0, 1), (0, 0), (0, 0), (0, 0)), constant_values=np.nan)
     lines = np.linspace(0.0, 1.0, n + 1)
     corners = np.pad(pieces.places, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
     parts = pieces.triangle, pieces.barycentrics, pieces.chart
@@ -306,10 +319,27 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
             samples.positions,
             normals=samples.normals,
             beyond=beyond,
-            covered=texel_areas(mesh, parts, corners, lines, len(glued)),
-            detours=link_detours(mesh, topology, samples.triangles, samples.barycentrics),
+            covered=texel_areas(mesh, parts, corners, lines, topology.shape[0]),
+            detours=detours,
         ),
         chart_map=PatchChartMap(pieces),
         triangles=samples.triangles,
         barycentrics=samples.barycentrics,
+        notes=patches.notes,
     )
+
+
+def _with_still_texels(mesh: Mesh, samples: Samples, still: Ints) -> Samples:
+    """The texels of all charts, and of one more that holds the triangles that lie still."""
+    triangles, weights = still_texels(still, samples.triangles.shape[1])
+    added = on_mesh(mesh, triangles, weights)
+    return Samples(
+        *(np.append(all_, one[None], axis=0) for all_, one in zip(samples, added, strict=True))
+    )
+
+
+def _sorted(pieces: Pieces, more: Pieces) -> Pieces:
+    """Pieces of different triangles as one, in the order of the triangles."""
+    whole = Pieces(*(np.concatenate(arrays) for arrays in zip(pieces, more, strict=True)))
+    order = np.argsort(whole.triangle, kind="stable")
+    return Pieces(*(array[order] for array in whole))

@@ -29,7 +29,8 @@ from .seamless import (
 )
 from .surface import TriangleSurface
 
-# Double area over squared length of a triangle on the charts after a collapse, at least.
+# Double area over squared length of a triangle on the charts after a collapse, at least. Where a
+# triangle is flatter already, such as a piece of a needle, a collapse must make none flatter.
 _MIN_FLATNESS = 0.05
 
 # Double area of a triangle in its parent, in barycentric coordinates, at least.
@@ -125,6 +126,7 @@ def _worth(
     turn, shift = inverse(frame_of(seamless, f, k))
     goal = turned(corner_place(seamless, f, m), turn) + shift
     flattest = np.inf
+    flattest_before = np.inf
     for i in range(seamless.star_start[u], seamless.star_start[u + 1]):
         g = seamless.star[i] // 3
         c = seamless.star[i] % 3
@@ -132,6 +134,7 @@ def _worth(
         q = (c + 2) % 3
         a = seamless.F[g, p]
         b = seamless.F[g, q]
+        flattest_before = min(flattest_before, _flatness(seamless, g))
         if a == v or b == v:
             continue
         # two tips in a triangle would leave it no way to move
@@ -144,7 +147,16 @@ def _worth(
         to_b = turned(corner_place(seamless, g, q), turn) + shift - goal
         longest = max(square(to_a), square(to_b), square(to_a - to_b))
         flattest = min(flattest, wedge(to_a, to_b) / longest)
-    return flattest if flattest > _MIN_FLATNESS else 0.0
+    return flattest if flattest > min(_MIN_FLATNESS, flattest_before) else 0.0
+
+
+@kernel
+def _flatness(seamless: SeamlessMap, f: int) -> float:
+    """Double area of a triangle on the charts over the square of its longest side."""
+    a = corner_place(seamless, f, 0)
+    b = corner_place(seamless, f, 1)
+    c = corner_place(seamless, f, 2)
+    return wedge(b - a, c - a) / max(square(b - a), square(c - a), square(c - b))
 
 
 @kernel

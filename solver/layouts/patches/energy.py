@@ -20,7 +20,17 @@ import numpy as np
 from ...kernel import Floats, Ints, Ints32, kernel
 from ...mesh.topology import edges_of
 from ...mesh.vectors import Vector, cross, dot, subtract
-from ..energy import FIXED, TERMS, Density, Reference, descend, energy_density, expand_star
+from ..energy import (
+    FIXED,
+    FREE,
+    TERMS,
+    Density,
+    Reference,
+    descend,
+    energy_density,
+    expand_star,
+    star_energy,
+)
 from ..newton import (
     CG_TOLERANCE,
     System,
@@ -62,11 +72,16 @@ _SWEEPS_BEFORE_NEWTON = 2
 # Newton steps of a relaxation, at most.
 _MAX_NEWTON_STEPS = 30
 
+# Ways of a vertex to the middle of its star that are tried to give each triangle an area, and how
+# much shorter each is than the one before.
+_MAX_OPENING_TRIALS = 12
+_SHORTER_OPENING = 0.5
+
 # Least and most steps of conjugate gradients in a Newton step.
 _CG_RANGE = 40, 200
 
 
-def reference_of(V: Floats, F: Ints, charts: int) -> Reference:
+def reference_of(V: Floats, F: Ints, charts: float) -> Reference:
     """Reference for the triangles F [m, 3]: the map is to resemble them.
 
     Their areas are scaled to add up to the number of charts.
@@ -224,11 +239,36 @@ def sweep(
             before = seamless.z[v]
             degree = gather(seamless, reference, v, before, star)
             lower, move = descend(star.terms, degree, reference.density, 0.0, seamless.freedom[v])
+            if lower == 0.0 and seamless.freedom[v] == FREE:
+                move = _opening(star, degree, reference.density)
             fall += lower
             seamless.z[v] = before + complex(move[0], move[1])
             if follow_at_once:
                 rehome_vertex(seamless, v, before)
     return fall
+
+
+@kernel
+def _opening(star: Star, degree: int, density: Density) -> Vector:
+    """A move of a star's vertex that gives every triangle an area, if round-off has left one without.
+
+    It leads some way to the middle of the star. The vertex stays where all triangles have areas, or
+    no move is found.
+    """
+    stay = (0.0, 0.0, 0.0)
+    if star_energy(star.terms, degree, density, stay) < np.inf:
+        return stay
+    x = 0.0
+    y = 0.0
+    for i in range(degree):
+        x += (star.first[i, 0] + star.second[i, 0]) / (2 * degree)
+        y += (star.first[i, 1] + star.second[i, 1]) / (2 * degree)
+    for _ in range(_MAX_OPENING_TRIALS):
+        x *= _SHORTER_OPENING
+        y *= _SHORTER_OPENING
+        if star_energy(star.terms, degree, density, (x, y, 0.0)) < np.inf:
+            return x, y, 0.0
+    return stay
 
 
 def sweep_all(seamless: SeamlessMap, reference: Reference, backwards: bool) -> float:
@@ -263,11 +303,13 @@ def newton_step(
 ) -> tuple[float, float]:
     """Move the map by one Newton step in place; return the fall of the energy and the step.
 
-    Whole steps have length 1; 0 where no step lowers the energy. `edge` [m, 3] are the edges ab,
+    Whole steps have length 1; 0 where no step lowers the energy, or it is infinite. `edge` [m, 3] are the edges ab,
     bc, ca of the triangles, and `ends` [e, 2] their vertices.
     """
     system = System.zeros(len(seamless.z), len(ends))
     energy = total_energy(seamless, reference)
+    if not energy < np.inf:
+        return 0.0, 0.0
     assemble(seamless, reference, edge, ends, system)
     # the directions in which vertices may not move are taken out
     free = np.stack([seamless.freedom & 1, seamless.freedom >> 1], axis=1).astype(bool)

@@ -10,15 +10,19 @@ turn round the old vertex is now nothing, a turn round the new one what the old 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
 from ...errors import AtlasError
 from ...kernel import Floats, Ints, kernel
-from ...mesh.topology import labels
+from ...mesh.clean import counted, place
+from ...mesh.topology import triangle_areas
 from ..energy import FIXED, FREE, Density, Reference, star_energy
 from .collapse import without_cuts
 from .energy import Star, energy_of, gather, reference_of, relax_all, scratch, sweep, sweep_all
+from .parts import MAX_PARTS, Part, Parts, carried_over, models_of, parts_of
 from .quads import CELLS, Quads, large_quads_of, quads_of
 from .seamless import (
     Frame,
@@ -28,6 +32,7 @@ from .seamless import (
     frame_of,
     inverse,
     seamless_map,
+    stars,
     turned,
     wedge,
 )
@@ -314,41 +319,142 @@ def _change(seamless: SeamlessMap, f: int, k: int, g: int, m: int) -> Frame:
     return after(inverse(frame_of(seamless, f, k)), frame_of(seamless, g, m))
 
 
+# What says how far the work is: it is called with a line of text.
+Report: TypeAlias = Callable[[str], None]
+
+
+def tell_nobody(text: str) -> None:
+    """Ignore how far the work is."""
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class PatchMap:
-    """A surface laid out on charts."""
+    """A surface laid out on charts.
+
+    Attributes
+    ----------
+    surface : TriangleSurface
+    seamless : SeamlessMap
+    still : int64 [k]
+        Triangles of the mesh without charts, in ascending order: they lie still.
+    notes : tuple of str
+        Why they do, one line each.
+    """
 
     surface: TriangleSurface
     seamless: SeamlessMap
+    still: Ints
+    notes: tuple[str, ...] = ()
 
 
-def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
+def patch_map(
+    V: Floats,
+    F: Ints,
+    cells: int = CELLS,
+    texels: int | None = None,
+    report: Report = tell_nobody,
+) -> PatchMap:
     """Lay a manifold, oriented mesh out on the charts of about `cells` cells, without a fold.
 
-    A cell has four to six charts.
+    A cell has four to six charts. Where the largest part allows it charts are large, one for each
+    of some more cells. Parts smaller than one of `texels` lie still, and so do parts that cannot be
+    laid out.
 
-    Where the largest part allows it charts are large, one for each of some more cells. Raises
-    `AtlasError` if its triangles are too thin, or no cells are found.
+    Raises `AtlasError` if no part can be laid out: its triangles are too thin, or no cells are
+    found.
     """
-    parts, counts, shares = _components(V, F, cells)
-    largest = int(shares.argmax())
-    large_quads = large_quads_of(parts[largest], counts[largest])
+    parts = parts_of(V, F, texels)
+    counts = _cell_counts(np.array([part.share for part in parts.waving]), cells)
+    models = models_of(parts.waving, counts)
+    quads, failures = _quads_of_parts(parts.waving, counts, models, report)
+    notes = _still_notes(V, F, parts, texels)
+    notes += [_failure_note(V, F, parts.waving[i], error) for i, error in failures.items()]
+    still = [*parts.crumbs, *parts.surplus, *(parts.waving[i].faces for i in failures)]
+    chart_count = sum(len(quads[models[i]].glued) for i in range(len(models)) if i not in failures)
+    area = sum(part.share for i, part in enumerate(parts.waving) if i not in failures)
+    relaxed: dict[int, tuple[TriangleSurface, SeamlessMap]] = {}
+    maps = []
+    for i, part in enumerate(parts.waving):
+        if i in failures:
+            continue
+        model = models[i]
+        if model not in relaxed:
+            report(f"evening out part {i + 1} of {len(models)}")
+            charts = chart_count * parts.waving[model].share / area
+            relaxed[model] = _relaxed(quads[model], charts)
+        surface, seamless = relaxed[model]
+        if i != model:
+            surface = carried_over(surface, parts.waving[model], part)
+        maps.append((surface, seamless))
+    surface, seamless = _joined(maps)
+    triangles = np.sort(np.concatenate(still)) if still else np.empty(0, np.int64)
+    return PatchMap(surface, seamless, triangles, tuple(notes))
+
+
+def _quads_of_parts(
+    parts: list[Part], counts: list[int], models: list[int], report: Report
+) -> tuple[dict[int, Quads], dict[int, AtlasError]]:
+    """The quads of each model, and why parts have none.
+
+    Raises the error of the largest part if no part has any.
+    """
+    shares = np.array([part.share for part in parts])
+    largest = models[int(shares.argmax())]
+    large_quads = large_quads_of(parts[largest].surface, counts[largest])
     large = large_quads is not None
-    quads = []
-    for i, part in enumerate(parts):
-        if large_quads is not None and i == largest:
-            quads.append(large_quads)
-        else:
-            quads.append(quads_of(part, counts[i], large))
-    chart_count = sum(len(part_quads.glued) for part_quads in quads)
-    wanted_charts = shares * chart_count
+    quads = {}
+    errors: dict[int, AtlasError] = {}
+    for i in sorted(set(models)):
+        report(f"cutting part {i + 1} of {len(parts)}")
+        try:
+            if large_quads is not None and i == largest:
+                quads[i] = large_quads
+            else:
+                quads[i] = quads_of(parts[i].surface, counts[i], large)
+        except AtlasError as error:
+            errors[i] = error
+    if not quads:
+        raise errors[largest]
+    failures = {i: errors[model] for i, model in enumerate(models) if model in errors}
+    chart_count = sum(len(quads[model].glued) for model in models if model in quads)
+    wanted = shares / shares[[model in quads for model in models]].sum() * chart_count
     if len(parts) > 1:
-        for i in np.flatnonzero(shares > _NEGLIGIBLE_AREA).tolist():
-            quads[i] = _recut(parts[i], counts[i], large, quads[i], float(wanted_charts[i]))
-    whole = _joined(quads)
-    surface, seamless = without_cuts(whole.surface, seamless_map(whole), whole.cut)
-    relax(surface.V, seamless)
-    return PatchMap(surface, seamless)
+        for i in quads:
+            if shares[i] > _NEGLIGIBLE_AREA:
+                report(f"cutting part {i + 1} of {len(parts)} again")
+                quads[i] = _recut(parts[i].surface, counts[i], large, quads[i], float(wanted[i]))
+    return quads, failures
+
+
+def _still_notes(V: Floats, F: Ints, parts: Parts, texels: int | None) -> list[str]:
+    """Notes on the parts that lie still since they are too small or too many."""
+    total = len(parts.waving) + len(parts.crumbs) + len(parts.surplus)
+    notes = []
+    if parts.crumbs:
+        width = np.sqrt(triangle_areas(V, F).sum() / (texels or 1))  # [m]
+        notes.append(
+            f"{len(parts.crumbs):,} of {counted(total, 'part')} lie still: smaller than a texel "
+            f"({width:.3g} m)"
+        )
+    if parts.surplus:
+        notes.append(
+            f"{len(parts.surplus):,} of {counted(total, 'part')} lie still: at most the "
+            f"{MAX_PARTS:,} largest carry waves"
+        )
+    return notes
+
+
+def _failure_note(V: Floats, F: Ints, part: Part, error: AtlasError) -> str:
+    """A note on a part that lies still since it cannot be laid out."""
+    near = place(V[F[part.faces]].reshape(-1, 3).mean(axis=0))
+    return f"a part of {counted(len(part.faces), 'triangle')} near {near} lies still: {error}"
+
+
+def _relaxed(quads: Quads, charts: float) -> tuple[TriangleSurface, SeamlessMap]:
+    """A part's map after relaxation; its area is that of a number of charts."""
+    surface, seamless = without_cuts(quads.surface, seamless_map(quads), quads.cut)
+    relax(surface.V, seamless, charts)
+    return surface, seamless
 
 
 def _recut(
@@ -379,13 +485,14 @@ def _recut(
     return best
 
 
-def relax(V: Floats, seamless: SeamlessMap) -> None:
+def relax(V: Floats, seamless: SeamlessMap, charts: float | None = None) -> None:
     """Even out areas and take away shear, in place, as far as the map's cones allow.
 
-    V [n, 3] are the vertices of the map [m]. The map that the quads begin with is good enough for
+    V [n, 3] are the vertices of the map [m]. Their surface has the area of a number of charts, by
+    default of as many as there are. The map that the quads begin with is good enough for
     this, as cells are small and flat. No step folds a triangle.
     """
-    reference = reference_of(V, seamless.F, len(seamless.glued))
+    reference = reference_of(V, seamless.F, len(seamless.glued) if charts is None else charts)
     relax_all(seamless, reference, _SAVING_BEFORE_TIPS)
     tips = np.flatnonzero(seamless.freedom == FIXED)
     for i in range(_MAX_TIP_MOVES):
@@ -396,53 +503,54 @@ def relax(V: Floats, seamless: SeamlessMap) -> None:
     relax_all(seamless, reference, _SAVING_AFTER_TIPS)
 
 
-def _components(V: Floats, F: Ints, cells: int) -> tuple[list[TriangleSurface], list[int], Floats]:
-    """Each connected component, how many cells it gets, and its share of the area."""
-    edges = np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2)
-    label = labels(edges, len(V))
-    numbers, part_of = np.unique(label[F[:, 0]], return_inverse=True)
-    areas = TriangleSurface.of(V, F).areas
-    share = np.bincount(part_of, areas / areas.sum()).astype(np.float64)
+def _cell_counts(shares: Floats, cells: int) -> list[int]:
+    """How many cells parts get that have shares of the area."""
     # a small part has a few cells at least: if large parts have more cells, the texels of the small
     # part are less tiny beside theirs
-    smallest = share[share >= min(_NEGLIGIBLE_AREA, share.max())].min()
+    smallest = shares[shares >= min(_NEGLIGIBLE_AREA, shares.max())].min()
     total = np.clip(_MIN_CELLS_OF_PART / smallest, cells, _MAX_CELL_FACTOR * cells)
-    count = np.maximum(1, np.rint(total * share)).astype(int)
-    parts = []
-    for part in range(len(numbers)):
-        faces = np.flatnonzero(part_of == part)
-        used, corners = np.unique(F[faces], return_inverse=True)
-        parts.append(dataclasses.replace(TriangleSurface.of(V[used], corners), parent=faces))
-    return parts, count.tolist(), share
+    return np.maximum(1, np.rint(total * shares)).astype(int).tolist()
 
 
-def _joined(parts: list[Quads]) -> Quads:
-    """Several surfaces as one."""
-    if len(parts) == 1:
-        return parts[0]
+def _joined(maps: list[tuple[TriangleSurface, SeamlessMap]]) -> tuple[TriangleSurface, SeamlessMap]:
+    """Several surfaces and their maps as one."""
+    if len(maps) == 1:
+        return maps[0]
     triangles = []
+    frames = []
     charts = []
     glued = []
     first_vertex = 0
     first_chart = 0
-    for part in parts:
-        triangles.append(part.surface.F + first_vertex)
-        charts.append(part.chart + first_chart)
-        part_glued = part.glued.copy()
+    for surface, seamless in maps:
+        triangles.append(seamless.F + first_vertex)
+        frames.append(seamless.frame + first_chart)
+        charts.append(seamless.chart + first_chart)
+        part_glued = seamless.glued.copy()
         part_glued[..., 0] += np.where(part_glued[..., 0] >= 0, first_chart, 0)
         glued.append(part_glued)
-        first_vertex += len(part.surface.V)
-        first_chart += len(part.glued)
-    surface = TriangleSurface(
-        np.concatenate([part.surface.V for part in parts]),
-        np.concatenate(triangles),
-        np.concatenate([part.surface.parent for part in parts]),
-        np.concatenate([part.surface.inside for part in parts]),
+        first_vertex += len(surface.V)
+        first_chart += len(seamless.glued)
+    F = np.concatenate(triangles)
+    start, star = stars(F, first_vertex)
+    whole = SeamlessMap(
+        F=F,
+        frame=np.concatenate(frames),
+        chart=np.concatenate(charts),
+        z=np.concatenate([seamless.z for _, seamless in maps]),
+        freedom=np.concatenate([seamless.freedom for _, seamless in maps]),
+        turn=np.concatenate([seamless.turn for _, seamless in maps]),
+        shift=np.concatenate([seamless.shift for _, seamless in maps]),
+        glued=np.concatenate(glued),
+        side_turn=np.concatenate([seamless.side_turn for _, seamless in maps]),
+        side_shift=np.concatenate([seamless.side_shift for _, seamless in maps]),
+        star_start=start,
+        star=star,
     )
-    return Quads(
-        surface,
-        np.concatenate(charts),
-        np.concatenate([part.places for part in parts]),
-        np.concatenate(glued),
-        np.concatenate([part.cut for part in parts]),
+    joined_surface = TriangleSurface(
+        np.concatenate([surface.V for surface, _ in maps]),
+        F,
+        np.concatenate([surface.parent for surface, _ in maps]),
+        np.concatenate([surface.inside for surface, _ in maps]),
     )
+    return joined_surface, whole

@@ -13,10 +13,12 @@ import numpy as np
 
 from ...kernel import Bools, Floats, Ints, kernel
 from ...texels.texel_areas import MOST_CORNERS, clip
+from .disks import signed_areas
 from .layout import PatchMap
 from .seamless import SeamlessMap, follow, places_on_charts, turned
 
-LEAST = 1e-12  # area on a chart below which a piece is left out
+# Area on a chart below which a piece is left out, unless it is the largest of its triangle.
+_MIN_PIECE_AREA = 1e-12
 
 
 class Pieces(NamedTuple):
@@ -52,9 +54,27 @@ def chart_pieces(patches: PatchMap) -> Pieces:
     triangle = patches.surface.parent[cut.triangle]
     order = np.argsort(triangle, kind="stable")
     barycentrics = cut.barycentrics @ patches.surface.inside[cut.triangle]
-    return Pieces(
-        triangle[order], barycentrics[order], cut.chart[order], np.clip(cut.places[order], 0.0, 1.0)
+    return _with_areas(
+        Pieces(
+            triangle[order],
+            barycentrics[order],
+            cut.chart[order],
+            np.clip(cut.places[order], 0.0, 1.0),
+        )
     )
+
+
+def _with_areas(pieces: Pieces) -> Pieces:
+    """The pieces that have an area on their chart.
+
+    Cuts that meet in a corner, or run along a side, leave pieces without one.
+    """
+    areas = signed_areas(pieces.places)
+    largest = np.zeros(int(pieces.triangle[-1]) + 1)
+    np.maximum.at(largest, pieces.triangle, areas)
+    kept = areas >= np.minimum(largest[pieces.triangle], _MIN_PIECE_AREA)
+    kept &= areas > 0.0
+    return Pieces(*(array[kept] for array in pieces))
 
 
 def _filled(cut: Any, *given: Any) -> Pieces:
@@ -95,7 +115,7 @@ def _cut_at_borders(
             for j in range(first[f, 1], last[f, 1]):
                 corners = clip(column, width, 0.0, float(j), 0.0, 1.0, 1, spare)
                 corners = clip(spare, corners, 0.0, j + 1.0, 0.0, -1.0, 1, square)
-                if corners < 3 or _area(square, corners) < LEAST:
+                if corners < 3 or not _area(square, corners) > 0.0:
                     continue
                 middle = 0j
                 for c in range(corners):
@@ -157,8 +177,10 @@ def warped(pieces: Pieces, offsets: Floats) -> Pieces:
     last = np.minimum(np.floor(pieces.places.max(axis=1) * n).astype(np.int64) + 3, n + 1)
     cut = _filled(_cut_at_lattice, pieces, nodes, bent, first, last)
     barycentrics = cut.barycentrics @ pieces.barycentrics[cut.triangle]
-    return Pieces(
-        pieces.triangle[cut.triangle], barycentrics, cut.chart, np.clip(cut.places, 0.0, 1.0)
+    return _with_areas(
+        Pieces(
+            pieces.triangle[cut.triangle], barycentrics, cut.chart, np.clip(cut.places, 0.0, 1.0)
+        )
     )
 
 
@@ -218,7 +240,7 @@ def _cut_at_lattice(
                             r = (ux * dy - uy * dx) / double
                             corner[k, 0] = (1.0 - s - r) * a[2] + s * b[2] + r * c[2]
                             corner[k, 1] = (1.0 - s - r) * a[3] + s * b[3] + r * c[3]
-                        if _area(corner, 3) < LEAST:
+                        if not _area(corner, 3) > 0.0:
                             continue
                         if count < len(room.chart):
                             room.triangle[count] = p

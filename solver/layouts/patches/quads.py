@@ -486,13 +486,12 @@ def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
 def large_quads_of(part: TriangleSurface, count: int) -> Quads | None:
     """Large quads, about as many as cells or some more.
 
-    None if the surface has none, or round-off folds one of them.
+    None if the surface has none or is too long, or round-off folds one of them.
     """
     most_cells = int(_MAX_LENGTH_TIMES_CELLS / _length(part))
     cell_count = max(count, min(round(_LARGE_CELL_FACTOR * count), most_cells))
-    cells = _cells_of(part, cell_count)
     try:
-        return cut_into_large_quads(cells)
+        return cut_into_large_quads(_cells_of(part, cell_count))
     except AtlasError:
         return None
 

@@ -243,11 +243,23 @@ def sampled(mesh: Mesh, patches: PatchMap, small: Ints, weights: Floats) -> Samp
     positions = np.einsum("...k,...kj->...j", weights, surface.V[surface.F[small]])
     triangles = surface.parent[small]
     barycentrics = np.einsum("...k,...kj->...j", weights, surface.inside[small])
+    normals = _normals(mesh, triangles, barycentrics)
+    return Samples(small, weights, triangles, barycentrics, positions, normals)
+
+
+def on_mesh(mesh: Mesh, triangles: Ints, barycentrics: Floats) -> Samples:
+    """Points at barycentric coordinates in triangles of the mesh, which no cut has made smaller."""
+    positions = np.einsum("...k,...kj->...j", barycentrics, mesh.V[mesh.F[triangles]])
+    normals = _normals(mesh, triangles, barycentrics)
+    return Samples(triangles, barycentrics, triangles, barycentrics, positions, normals)
+
+
+def _normals(mesh: Mesh, triangles: Ints, barycentrics: Floats) -> Floats:
+    """Unit normals at points of the mesh."""
     at_corners = mesh.vertex_normals[mesh.F[triangles]]
     normals = np.einsum("...k,...kj->...j", barycentrics, at_corners)
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
-    normals = np.where(length > 1e-9, normals / np.maximum(length, 1e-9), at_corners[..., 0, :])
-    return Samples(small, weights, triangles, barycentrics, positions, normals)
+    return np.where(length > 1e-9, normals / np.maximum(length, 1e-9), at_corners[..., 0, :])
 
 
 def centres(mesh: Mesh, patches: PatchMap, n: int) -> Samples:

@@ -1,6 +1,7 @@
 """Atlases of the patch layout of any surface; eigenvalues against exact ones."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from ripple_sim.solver import (
     WaveSolver,
     build_atlas,
     glue,
+    load_atlas,
     load_mesh,
 )
 from ripple_sim.solver.layouts.patches import (
@@ -236,6 +238,110 @@ def test_a_small_tube_beside_a_sheet_gets_charts_without_a_fold() -> None:
     assert set(mesh.components[atlas.triangles].ravel()) == {0, 1}
 
 
+def two_rectangles() -> Mesh:
+    sheet = np.array([[0.0, 0, 0], [550, 0, 0], [550, 550, 0], [0, 550, 0]])
+    lamp = np.array([[200.0, 200, 50], [330, 200, 50], [330, 305, 50], [200, 305, 50]])
+    F = np.array([[0, 1, 2], [0, 2, 3]])
+    return Mesh.from_arrays(np.concatenate([sheet, lamp]), np.concatenate([F, F + 4]))
+
+
+def test_pieces_without_area_are_left_out() -> None:
+    atlas = build_atlas(two_rectangles(), 24, cache=False)
+    assert atlas.quality()["flipped"] == 0
+    share = np.abs(np.linalg.det(atlas.chart_map.pieces.barycentrics))
+    covered = np.bincount(atlas.chart_map.pieces.triangle, share)
+    np.testing.assert_allclose(covered, 1.0, atol=1e-9)
+
+
+def ball_and_crumbs() -> Mesh:
+    """A ball, and 30 tetrahedra round it of which each is smaller than a texel."""
+    corners = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    crumb = Mesh.from_arrays(corners, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    places = np.random.default_rng(0).normal(size=(30, 3))
+    places *= 1.5 / np.linalg.norm(places, axis=1, keepdims=True)
+    crumbs = [moved(crumb, tuple(place), 0.003) for place in places]
+    return joined(sphere(2), *crumbs)
+
+
+@pytest.fixture(scope="module")
+def crumbly() -> Atlas:
+    return build_atlas(ball_and_crumbs(), 24, cache=False)
+
+
+def test_parts_smaller_than_a_texel_lie_still_and_are_named_once(crumbly: Atlas) -> None:
+    (note,) = crumbly.notes
+    assert note.startswith("30 of 31 parts lie still: smaller than a texel")
+    assert crumbly.texels.topology.still.sum() == 1
+    quality = crumbly.quality()
+    assert quality["flipped"] == quality["folded"] == 0
+    assert quality["coverage"] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_every_texel_of_a_part_that_lies_still_is_found_where_it_lies(crumbly: Atlas) -> None:
+    still = np.flatnonzero(crumbly.texels.topology.still)
+    points = crumbly.positions[still].reshape(-1, 3)
+    n = crumbly.resolution
+    np.testing.assert_array_equal(crumbly.nearest_texel(points) // (n * n), still[0])
+    corners = crumbly.mesh.V[crumbly.mesh.F[crumbly.triangles]]
+    np.testing.assert_allclose(
+        np.einsum("...k,...kj->...j", crumbly.barycentrics, corners), crumbly.positions, atol=1e-12
+    )
+    pieces = crumbly.texture_coordinates()
+    share = np.abs(np.linalg.det(pieces.barycentrics))
+    covered = np.bincount(pieces.triangle, share, len(crumbly.mesh.F))
+    np.testing.assert_allclose(covered, 1.0, atol=1e-6)
+
+
+def test_a_push_on_a_part_that_lies_still_moves_nothing(crumbly: Atlas, tmp_path: Path) -> None:
+    crumbly.save(tmp_path / "crumbs.npz")
+    for atlas in (crumbly, load_atlas(tmp_path / "crumbs.npz")):
+        waves = WaveSolver(atlas, Material(speed=1.0), backend="cpu")
+        crumb = atlas.mesh.V[-1]
+        waves.add_impulse(crumb, 1e-3, 0.0)
+        waves.step(0.1)
+        assert not waves.height[atlas.texels.topology.still].any()
+        assert np.abs(waves.height).max() == 0.0
+        waves.add_impulse([0.0, 0.0, 1.0], 1e-3, 0.3)
+        waves.step(0.1)
+        assert np.abs(waves.height[~atlas.texels.topology.still]).max() > 0
+        assert not waves.height[atlas.texels.topology.still].any()
+
+
+def test_a_part_that_cannot_be_laid_out_lies_still_and_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(part: TriangleSurface, count: int, large: bool) -> Quads:
+        raise AtlasError("4 triangles of the surface are too thin to be laid out flat")
+
+    monkeypatch.setattr(layout, "quads_of", fail)
+    mesh = joined(sphere(2), moved(torus(6), (3, 0, 0), 0.3))
+    atlas = build_atlas(mesh, 24, cache=False)
+    assert any("a part of" in note and "lies still: 4 triangles" in note for note in atlas.notes)
+    n = atlas.resolution
+    still = atlas.texels.topology.still[atlas.nearest_texel(mesh.V) // (n * n)]
+    np.testing.assert_array_equal(still, np.abs(mesh.V[:, 0]) > 1.5)
+
+
+def test_parts_of_one_shape_are_cut_into_charts_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    cut = []
+
+    def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
+        cut.append(part)
+        return quads.quads_of(part, count, large)
+
+    monkeypatch.setattr(layout, "quads_of", quads_of)
+    small = torus(6)
+    turn = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
+    turned = Mesh.from_arrays(small.V @ turn.T, small.F)
+    mesh = joined(sphere(2), moved(small, (3, 0, 0), 0.3), moved(turned, (-3, 0, 0), 0.3))
+    atlas = build_atlas(mesh, 24, cache=False)
+    assert len({id(part) for part in cut if len(part.F) == len(small.F)}) == 1
+    parts = mesh.components[atlas.triangles]
+    assert (parts == 1).sum() == (parts == 2).sum()
+    assert atlas.quality()["flipped"] == 0
+    assert atlas.quality()["coverage"] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_a_failed_second_cut_of_a_part_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
     cuts = []
 
@@ -247,7 +353,7 @@ def test_a_failed_second_cut_of_a_part_keeps_the_first(monkeypatch: pytest.Monke
         return quads.quads_of(part, 1, False)
 
     monkeypatch.setattr(layout, "quads_of", cut_once)
-    mesh = joined(sphere(2), moved(sphere(2), (3, 0, 0)))
+    mesh = joined(sphere(2), moved(torus(8), (3, 0, 0)))
     patches = patch_map(mesh.V, mesh.F, 48)
     assert len(cuts) > 1
     assert len(patches.seamless.glued) > 0
