@@ -298,7 +298,10 @@ class _Builder:
 
 
 def _patches(mesh: Mesh, resolution: int) -> Atlas:
-    """Atlas of the patch layout, with messages while that takes long, and of parts that lie still."""
+    """Atlas of the patch layout.
+
+    Messages tell how far the work is while it takes long, and which parts lie still.
+    """
     with _progress_messages(mesh) as report:
         atlas = patch_atlas(mesh, resolution, report)
     for note in atlas.notes:

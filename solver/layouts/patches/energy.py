@@ -250,7 +250,7 @@ def sweep(
 
 @kernel
 def _opening(star: Star, degree: int, density: Density) -> Vector:
-    """A move of a star's vertex that gives every triangle an area, if round-off has left one without.
+    """A move of a star's vertex that gives an area to triangles that round-off left without one.
 
     It leads some way to the middle of the star. The vertex stays where all triangles have areas, or
     no move is found.
@@ -303,8 +303,8 @@ def newton_step(
 ) -> tuple[float, float]:
     """Move the map by one Newton step in place; return the fall of the energy and the step.
 
-    Whole steps have length 1; 0 where no step lowers the energy, or it is infinite. `edge` [m, 3] are the edges ab,
-    bc, ca of the triangles, and `ends` [e, 2] their vertices.
+    Whole steps have length 1; 0 where no step lowers the energy, or it is infinite. `edge` [m, 3]
+    are the edges ab, bc, ca of the triangles, and `ends` [e, 2] their vertices.
     """
     system = System.zeros(len(seamless.z), len(ends))
     energy = total_energy(seamless, reference)

@@ -47,7 +47,7 @@ def still_texels(triangles: Ints, n: int) -> tuple[Ints, Floats]:
     column, right = _cell(np.broadcast_to(centre, (n, n)), columns[row][:, None])
     up = np.broadcast_to(up[:, None], (n, n))
     is_first_half = up <= right
-    # the triangle (0, 0), (1, 0), (1, 1) with weights 1 - right, right - up, up, and its mirror image
+    # in the half below the diagonal the weights are 1 - right, right - up and up
     along = np.maximum(right, up)
     beyond = np.minimum(right, up)
     outer = along - beyond
