@@ -333,13 +333,13 @@ def _with_still_texels(mesh: Mesh, samples: Samples, still: Ints) -> Samples:
     """The texels of all charts, and of one more that holds the triangles that lie still."""
     triangles, weights = still_texels(still, samples.triangles.shape[1])
     added = on_mesh(mesh, triangles, weights)
-    return Samples(
-        *(np.append(all_, one[None], axis=0) for all_, one in zip(samples, added, strict=True))
+    return Samples._make(
+        np.append(all_, one[None], axis=0) for all_, one in zip(samples, added, strict=True)
     )
 
 
 def _sorted(pieces: Pieces, more: Pieces) -> Pieces:
     """Pieces of different triangles as one, in the order of the triangles."""
-    whole = Pieces(*(np.concatenate(arrays) for arrays in zip(pieces, more, strict=True)))
+    whole = Pieces._make(np.concatenate(arrays) for arrays in zip(pieces, more, strict=True))
     order = np.argsort(whole.triangle, kind="stable")
-    return Pieces(*(array[order] for array in whole))
+    return Pieces._make(array[order] for array in whole)

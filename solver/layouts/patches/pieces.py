@@ -74,7 +74,7 @@ def _with_areas(pieces: Pieces) -> Pieces:
     np.maximum.at(largest, pieces.triangle, areas)
     kept = areas >= np.minimum(largest[pieces.triangle], _MIN_PIECE_AREA)
     kept &= areas > 0.0
-    return Pieces(*(array[kept] for array in pieces))
+    return Pieces._make(array[kept] for array in pieces)
 
 
 def _filled(cut: Any, *given: Any) -> Pieces:

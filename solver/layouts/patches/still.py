@@ -63,7 +63,7 @@ def still_texels(triangles: Ints, n: int) -> tuple[Ints, Floats]:
 
 
 def _grid(count: int) -> tuple[Ints, Ints, int, Ints]:
-    """Row and column [count] of the rectangles of a chart, its rows, and the columns of each row."""
+    """Row and column [count] of rectangles on a chart, its rows, and the columns of each row."""
     rows = max(round(np.sqrt(count)), 1)
     columns = np.full(rows, count // rows)
     columns[: count % rows] += 1
