@@ -1,6 +1,7 @@
 """Warnings where impulses will be wrong: geoms too fast, solvers that stop too early."""
 
 import warnings
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -17,8 +18,15 @@ MASS = 1e-5
 DT = 0.001
 
 
-def throw(solver: str, tolerance: float, target: float) -> tuple[float, list[str]]:
-    """Share of a box's force missing in a target's momentum, and warnings; target mass in kg."""
+class Throw(NamedTuple):
+    """A box thrown on a target: share of the force missing in its momentum, and warnings."""
+
+    missing: float
+    warnings: list[str]
+
+
+def throw(solver: str, tolerance: float, target: float) -> Throw:
+    """Throw a box on a target of a mass [kg]."""
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco>
         <option timestep="{DT}" tolerance="{tolerance}" solver="{solver}" iterations="1000"
@@ -43,28 +51,27 @@ def throw(solver: str, tolerance: float, target: float) -> tuple[float, list[str
             force = np.einsum("kij,ki->j", frames, contact_forces(model, data)[:, :3])
             pressed += np.linalg.norm(force) * DT
             missing += np.linalg.norm(MASS * (data.qvel[6:9] - before) - force * DT)
-    return missing / pressed, [
-        str(warning.message) for warning in caught if "solver" in str(warning.message)
-    ]
+    messages = [str(warning.message) for warning in caught]
+    return Throw(missing / pressed, [message for message in messages if "solver" in message])
 
 
 @pytest.mark.parametrize("solver", ["Newton", "CG"])
-def test_a_solver_that_stops_too_early_is_warned_of_and_the_advice_helps(solver: str) -> None:
-    missing, messages = throw(solver, 1e-8, target=1e3)
-    assert missing > 0.05
-    assert len(messages) == 1
-    assert "the impulses on geom 'target' are wrong by about" in messages[0]
-    assert "set option tolerance to 1e-14" in messages[0]
-    missing, messages = throw(solver, 1e-14, target=1e3)
-    assert missing < 1e-3
-    assert not messages
+def test_warning_about_a_solver_that_stops_too_early_and_its_advice_helps(solver: str) -> None:
+    early = throw(solver, 1e-8, target=1e3)
+    assert early.missing > 0.05
+    [message] = early.warnings
+    assert "the impulses on geom 'target' are wrong by about" in message
+    assert "set option tolerance to 1e-14" in message
+    advised = throw(solver, 1e-14, target=1e3)
+    assert advised.missing < 1e-3
+    assert not advised.warnings
 
 
 @pytest.mark.parametrize("solver", ["Newton", "CG", "PGS"])
-def test_a_solver_that_has_converged_is_not_warned_of(solver: str) -> None:
-    missing, messages = throw(solver, 1e-8, target=1e-2)
-    assert missing < 3e-3
-    assert not messages
+def test_no_warning_about_a_solver_that_has_converged(solver: str) -> None:
+    converged = throw(solver, 1e-8, target=1e-2)
+    assert converged.missing < 3e-3
+    assert not converged.warnings
 
 
 TREES = """<mujoco><option gravity="0 0 0" timestep="0.001"/><worldbody>
@@ -79,7 +86,7 @@ TREES = """<mujoco><option gravity="0 0 0" timestep="0.001"/><worldbody>
 
 
 def rows_of(pairs: np.ndarray) -> np.ndarray:
-    """Pairs of geoms that are near wherever they are, and may not sink in."""
+    """Pairs of geoms that count as near at any distance, and may not sink in."""
     return np.array([(*pair, 0.0, np.inf, 0.0) for pair in pairs], PAIR)
 
 
@@ -106,9 +113,8 @@ def test_speeds_of_geoms_on_turning_trees_of_bodies_are_mujocos(seed: int) -> No
         np.testing.assert_array_equal(rows, approaching)
         np.testing.assert_allclose(speeds, np.linalg.norm(relative[rows], axis=1), rtol=1e-12)
         seen += rows.tolist()
-    assert sorted(seen) == list(range(len(pairs))), (
-        "what comes nearer goes away when time runs backwards"
-    )
+    # each pair comes nearer in one of the two directions of time
+    assert sorted(seen) == list(range(len(pairs)))
     data.cvel[:] = np.nan
     assert not len(too_fast(rows_of(pairs), model, data, 5)[0])
     assert not len(too_fast(rows_of(pairs[:0]), model, data, 5)[0])
@@ -120,14 +126,29 @@ PLATE = '<geom name="plate" type="box" size="0.3 0.3 0.02"/>'
 SHOT = '<body name="ball" pos="0 0 {}"><freejoint/><geom size="0.03"/></body>'
 
 
-def watched(xml: str) -> tuple[mujoco.MjModel, mujoco.MjData, TunnellingCheck]:
-    """A model without gravity, and the check of its geom 0."""
+class Watched(NamedTuple):
+    """A model, its data, and the check of its geom 0."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    check: TunnellingCheck
+
+
+def watched(xml: str) -> Watched:
+    """A model without gravity under the check."""
     model = mujoco.MjModel.from_xml_string(f'<mujoco><option gravity="0 0 0"/>{xml}</mujoco>')
-    return model, mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0])
+    return Watched(model, mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0]))
 
 
-def shoot(speed: float, solref: str, timestep: float) -> tuple[bool, list[str]]:
-    """Whether a ball is thrown back by a plate, and the warnings on its way."""
+class Shot(NamedTuple):
+    """A ball shot at a plate: whether the plate throws it back, and the warnings."""
+
+    bounced: bool
+    warnings: list[str]
+
+
+def shoot(speed: float, solref: str, timestep: float) -> Shot:
+    """Shoot a ball at a plate."""
     model, data, check = watched(
         f"""<option timestep="{timestep}"/><default><geom solref="{solref}"/></default>
         <worldbody>{PLATE}{SHOT.format(0.6)}</worldbody>"""
@@ -139,37 +160,41 @@ def shoot(speed: float, solref: str, timestep: float) -> tuple[bool, list[str]]:
             check(data)
             if data.qvel[2] > 0:
                 break
-    return bool(data.qvel[2] > 0), [str(w.message) for w in caught if w.category is RippleWarning]
+    messages = [str(warning.message) for warning in caught if warning.category is RippleWarning]
+    return Shot(bool(data.qvel[2] > 0), messages)
 
 
 @pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2", "0.004 1"])
 def test_tunnelling_geoms_get_a_warning_and_slow_geoms_none(solref: str) -> None:
-    outcomes = [shoot(speed, solref, 0.002) for speed in np.geomspace(0.5, 120, 14)]
-    assert all(warned for back, warned in outcomes if not back)
-    first_warned = next(i for i, (_, warned) in enumerate(outcomes) if warned)
-    first_through = next(i for i, (back, _) in enumerate(outcomes) if not back)
-    # neither too late nor so early that nobody heeds it: within a factor of three in speed
-    assert 0 <= first_through - first_warned <= 2 + np.log(3) / np.log(120 / 0.5) * 13
-    assert all(len(warned) <= 1 for _, warned in outcomes)
+    speeds = np.geomspace(0.5, 120, 14)
+    shots = [shoot(speed, solref, 0.002) for speed in speeds]
+    assert all(shot.warnings for shot in shots if not shot.bounced)
+    assert all(len(shot.warnings) <= 1 for shot in shots)
+    first_warned = [bool(shot.warnings) for shot in shots].index(True)
+    first_through = [shot.bounced for shot in shots].index(False)
+    # not too late, and not so early that users ignore it: a factor of three in speed, and two of
+    # the tried speeds to either side
+    tries_in_factor_of_3 = np.log(3) / np.log(speeds[1] / speeds[0])
+    assert 0 <= first_through - first_warned <= 2 + tries_in_factor_of_3
 
 
-def test_warning_names_body_speed_and_a_time_step_that_does() -> None:
-    back, [message] = shoot(20.0, "0.02 1", 0.002)
-    assert not back
+def test_warning_names_body_speed_and_a_time_step_that_suffices() -> None:
+    bounced, [message] = shoot(20.0, "0.02 1", 0.002)
+    assert not bounced
     assert "body 'ball' meets geom 'plate' at 20 m/s" in message
     timestep = float(message.split("time step of ")[-1].split()[0])
     assert timestep < 0.002
     assert "a solref of twice that" in message
-    assert shoot(20.0, f"{2 * timestep} 1", timestep) == (True, [])
+    assert shoot(20.0, f"{2 * timestep} 1", timestep) == Shot(bounced=True, warnings=[])
 
 
 def test_warning_names_a_solref_where_the_time_step_suffices() -> None:
-    back, [message] = shoot(10.0, "0.02 1", 0.002)
-    assert not back
+    bounced, [message] = shoot(10.0, "0.02 1", 0.002)
+    assert not bounced
     advice = message.split("; ")[-1]
     solref = advice.split('"')[1]
     assert advice == f'use a solref of "{solref}" or less for both'
-    assert shoot(10.0, solref, 0.002) == (True, [])
+    assert shoot(10.0, solref, 0.002) == Shot(bounced=True, warnings=[])
 
 
 def test_a_pair_is_warned_of_again_only_if_it_is_much_worse() -> None:
@@ -185,7 +210,7 @@ def test_a_pair_is_warned_of_again_only_if_it_is_much_worse() -> None:
     assert [str(each.message).split("'")[1] for each in caught] == ["first", "worse"]
 
 
-def test_moving_target_counts_with_its_own_speed() -> None:
+def test_the_speed_is_relative_to_a_moving_target() -> None:
     model, data, check = watched(
         f"<worldbody><body><freejoint/>{PLATE}</body>{SHOT.format(0.2)}</worldbody>"
     )
@@ -201,7 +226,7 @@ def test_moving_target_counts_with_its_own_speed() -> None:
 
 
 @pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2", "0.149 0.0335"])
-def test_geoms_stuck_in_an_sdf_got_a_warning(solref: str) -> None:
+def test_warning_before_geoms_get_stuck_in_an_sdf(solref: str) -> None:
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.002" gravity="0 0 0" sdf_initpoints="10"/>
         <default><geom solref="{solref}" condim="1"/></default>
@@ -214,8 +239,8 @@ def test_geoms_stuck_in_an_sdf_got_a_warning(solref: str) -> None:
         data = mujoco.MjData(model)
         check = TunnellingCheck(CoupledModel(model), [0])
         data.qvel[2] = -speed
-        forces = 0.0
-        push = 0.0
+        forces = 0.0  # sum of the amounts of contact forces
+        push = 0.0  # amount of their sum: less where some pull the geom in
         with warnings.catch_warnings(record=True, action="always") as caught:
             while data.time < 0.2 / speed + 0.06:
                 mujoco.mj_step(model, data)
@@ -234,7 +259,7 @@ def test_geoms_stuck_in_an_sdf_got_a_warning(solref: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "solref"), [("sphere", "0.02 1"), ("sphere", BOUNCY), ("cylinder", BOUNCY)]
 )
-def test_geoms_that_pass_a_flex_or_are_thrown_aside_got_a_warning(kind: str, solref: str) -> None:
+def test_warning_before_geoms_pass_a_flex_or_are_thrown_aside(kind: str, solref: str) -> None:
     slab = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
     V, F = trimesh.remesh.subdivide_to_size(slab.vertices, slab.faces, 0.06)
     spec = mujoco.MjSpec.from_string(
@@ -267,7 +292,7 @@ def test_geoms_that_pass_a_flex_or_are_thrown_aside_got_a_warning(kind: str, sol
     assert 0 < right.index(False) - warned.index(True) + 1 <= 4
 
 
-def test_speculative_contacts_make_the_check_needless_but_for_sdf(
+def test_speculative_contacts_turn_the_check_off(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     flags = [

@@ -1,6 +1,7 @@
 """Two-way coupling: a risen surface pushes bodies, and momentum is conserved."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,6 +13,30 @@ from ripple_sim import Material, Ripples
 from ripple_sim.coupling import support_point
 
 GRAVITY = 9.81
+BALL_RADIUS = 0.05  # m
+BLOCK_MASS = 5.0  # kg
+
+
+class RingRun(NamedTuple):
+    """A run of `ring` over its steps.
+
+    Attributes
+    ----------
+    heights : [k]
+        Of the ball's lowest point over the block at rest [m].
+    times : [k]
+        [s].
+    bodies, surface : [k]
+        Upward momentum of the bodies that can move, and of the waves [N s].
+    speeds : [k]
+        Greatest upward speed of the surface under the ball [m/s].
+    """
+
+    heights: np.ndarray
+    times: np.ndarray
+    bodies: np.ndarray
+    surface: np.ndarray
+    speeds: np.ndarray
 
 
 def ring(
@@ -21,14 +46,14 @@ def ring(
     mass: float = 0.2,
     gap: float = -1e-4,
     gravity: float = GRAVITY,
-):
-    """A ring reaches a ball on or above a block: heights, momenta and speed over time."""
+) -> RingRun:
+    """Let a ring run to a ball that lies on a block, or above it by a gap [m]."""
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.001" gravity="0 0 {-gravity}"/><worldbody>
         <body name="block" pos="0 0 -0.2">{target}
-        <geom name="block" type="box" size="0.5 0.5 0.2" mass="5"/></body>
-        <body name="ball" pos="0 0 {0.05 + gap}"><freejoint/>
-        <geom name="ball" size="0.05" mass="{mass}"/></body>
+        <geom name="block" type="box" size="0.5 0.5 0.2" mass="{BLOCK_MASS}"/></body>
+        <body name="ball" pos="0 0 {BALL_RADIUS + gap}"><freejoint/>
+        <geom name="ball" size="{BALL_RADIUS}" mass="{mass}"/></body>
         </worldbody></mujoco>"""
     )
     run = Run(
@@ -39,22 +64,29 @@ def ring(
     # a ring on its way to the ball
     place = waves.atlas.positions
     away = np.hypot(place[..., 0], place[..., 1])
-    waves.velocity = speed * np.exp(-(((away - 0.12) / 0.03) ** 2)) * (place[..., 2] > 0.19)
-    heights = []
-    total = []
+    on_top = place[..., 2] > 0.19
+    under_ball = (away < 0.03) & on_top
+    waves.velocity = speed * np.exp(-(((away - 0.12) / 0.03) ** 2)) * on_top
+    rows = []
     while data.time < 0.3:
         run.step()
-        joints = data.qvel[2::6] if target else data.qvel[2:3]
-        masses = [5.0, mass] if target else [mass]
-        heights.append(float(data.body("ball").xpos[2]) - 0.05)
-        under = float(waves.velocity[(away < 0.03) & (place[..., 2] > 0.19)].max())
-        total.append((data.time, float(np.dot(masses, joints)), waves.momentum(), under))
-    return np.array(heights), np.array(total)
+        upward = data.qvel[2::6] if target else data.qvel[2:3]
+        masses = [BLOCK_MASS, mass] if target else [mass]
+        rows.append(
+            RingRun(
+                heights=float(data.body("ball").xpos[2]) - BALL_RADIUS,
+                times=data.time,
+                bodies=float(np.dot(masses, upward)),
+                surface=waves.momentum(),
+                speeds=float(waves.velocity[under_ball].max()),
+            )
+        )
+    return RingRun(*np.array(rows).T)
 
 
-def test_passing_ripple_kicks_a_resting_ball_only_if_it_may() -> None:
-    still, _ = ring(two_way=False, speed=4.0, mass=0.05)
-    kicked, _ = ring(two_way=True, speed=4.0, mass=0.05)
+def test_a_passing_ripple_kicks_a_resting_ball_only_with_two_way_coupling() -> None:
+    still = ring(two_way=False, speed=4.0, mass=0.05).heights
+    kicked = ring(two_way=True, speed=4.0, mass=0.05).heights
     assert np.abs(still).max() < 1e-3
     assert kicked.max() > 0.01
     # not before the ring is there, 0.1 m away at 1 m/s less its width
@@ -62,31 +94,32 @@ def test_passing_ripple_kicks_a_resting_ball_only_if_it_may() -> None:
 
 
 def test_ball_and_surface_exchange_momentum_and_keep_the_sum() -> None:
-    _, total = ring(two_way=True)
-    time, ball, surface, _ = total.T
-    # gravity is all that acts from outside: no springs, no damping. Until 0.1 s no long contact has
-    # a deficit.
-    early = time < 0.1
-    start = surface[0] + ball[0] + 0.2 * GRAVITY * time[0]
-    sums = surface + ball + 0.2 * GRAVITY * time
-    assert np.abs(sums[early] - start).max() < 1e-4 * abs(surface[0])
-    assert ball.max() > 0.02
-    late = time > 0.28
-    assert np.abs(sums[late] - start).max() < 0.02 * abs(surface[0])
+    run = ring(two_way=True)
+    # only gravity acts from outside: no springs, no damping
+    sums = run.surface + run.bodies + 0.2 * GRAVITY * run.times
+    gained = np.abs(sums - sums[0])
+    exchanged = abs(run.surface[0])
+    # before 0.1 s there is no long contact, of which the rest filter holds a part back
+    assert gained[run.times < 0.1].max() < 1e-4 * exchanged
+    assert run.bodies.max() > 0.02
+    assert gained[run.times > 0.28].max() < 0.02 * exchanged
 
 
 def test_free_target_recoils() -> None:
     """The rigid bodies alone keep their momentum: what the ball gains, the block under it loses."""
-    _, total = ring(two_way=True, target="<freejoint/>")
-    time, bodies, _, _ = total.T
-    np.testing.assert_allclose(bodies, -5.2 * GRAVITY * time, atol=2e-3)
+    run = ring(two_way=True, target="<freejoint/>")
+    weight = (BLOCK_MASS + 0.2) * GRAVITY
+    np.testing.assert_allclose(run.bodies, -weight * run.times, atol=2e-3)
 
 
 def test_ball_is_never_thrown_faster_than_the_surface_moves() -> None:
-    _, total = ring(two_way=True, speed=3.0, mass=0.001)
-    fastest = total[:, 1].max() / 0.001
-    surface = total[:, 3].max()
-    assert 0.5 * surface < fastest < surface
+    run = ring(two_way=True, speed=3.0, mass=0.001)
+    fastest_ball = run.bodies.max() / 0.001
+    fastest_surface = run.speeds.max()
+    assert 0.5 * fastest_surface < fastest_ball < fastest_surface
+
+
+FORCE = np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.0])  # a user's force and torque [N, N m]
 
 
 def touching(geoms: str, gravity: float = -GRAVITY, **options: object) -> Run:
@@ -111,9 +144,6 @@ def pushed(force: Callable[[mujoco.MjData], None]) -> tuple[mujoco.MjData, Rippl
         highest = max(highest, run.data.qpos[2])
     assert highest > 0.2505  # it was pushed
     return run.data, run.ripples
-
-
-FORCE = np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def test_users_forces_stay_as_they_were() -> None:
@@ -143,7 +173,7 @@ def test_nothing_is_left_after_a_reset() -> None:
     np.testing.assert_array_equal(data.xfrc_applied, [[0.0] * 6, FORCE])
 
 
-def test_a_body_that_touches_twice_is_pushed_once() -> None:
+def test_a_body_with_two_geoms_in_touch_is_pushed_once() -> None:
     """Two geoms on one patch do not make a body faster than the surface."""
     speeds = []
     for geoms in ('<geom size="0.05" mass="0.002"/>', 2 * '<geom size="0.05" mass="0.001"/>'):
@@ -154,13 +184,12 @@ def test_a_body_that_touches_twice_is_pushed_once() -> None:
     assert speeds[0] == pytest.approx(speeds[1], rel=0.02)
 
 
-def test_ripple_reaches_a_ball_above_it_only_as_high_as_the_wave() -> None:
+def test_a_ripple_reaches_a_ball_above_it_only_up_to_its_height() -> None:
     """MuJoCo sees no contact; the displaced surface hits the ball, and loses what it gains."""
-    heights, total = ring(two_way=True, speed=4.0, mass=0.05, gap=0.004, gravity=0.0)
-    assert heights[-1] > 0.05
-    _, ball, surface, _ = total.T
-    np.testing.assert_allclose((ball + surface)[1:], surface[0], rtol=1e-4)
-    missed, _ = ring(two_way=True, speed=4.0, mass=0.05, gap=0.5, gravity=0.0)
+    run = ring(two_way=True, speed=4.0, mass=0.05, gap=0.004, gravity=0.0)
+    assert run.heights[-1] > 0.05
+    np.testing.assert_allclose((run.bodies + run.surface)[1:], run.surface[0], rtol=1e-4)
+    missed = ring(two_way=True, speed=4.0, mass=0.05, gap=0.5, gravity=0.0).heights
     np.testing.assert_array_equal(missed, missed[0])
 
 
@@ -196,7 +225,7 @@ def geom_model(kind: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 @pytest.mark.parametrize("kind", GEOMS)
-def test_rays_meet_no_point_that_lies_farther(kind: str) -> None:
+def test_no_ray_meets_the_geom_beyond_its_support_point(kind: str) -> None:
     model, data = geom_model(kind)
     rotation = data.geom_xmat[0].reshape(3, 3)
     origin = data.geom_xpos[0]
@@ -204,7 +233,7 @@ def test_rays_meet_no_point_that_lies_farther(kind: str) -> None:
     geom = np.zeros(1, dtype=np.int32)
 
     def height(point: np.ndarray, direction: np.ndarray) -> float:
-        """Of what a ray against the direction through a point meets first; -inf if nothing."""
+        """Height of the first hit of a ray against the direction; -inf without a hit."""
         start = point + 3.0 * direction
         away = mujoco.mj_ray(
             model, data, origin + rotation @ start, -rotation @ direction, None, 1, -1, geom
@@ -223,7 +252,7 @@ def test_rays_meet_no_point_that_lies_farther(kind: str) -> None:
         assert height(0.999 * farthest, direction) == pytest.approx(farthest @ direction, abs=5e-3)
 
 
-def test_middle_of_a_face_that_lies_flat() -> None:
+def test_the_support_point_of_a_flat_face_is_its_middle() -> None:
     down = np.array([0.005, -0.004, -1.0])
     np.testing.assert_allclose(support_point(geom_model("box")[0], 0, down), [0, 0, -0.1])
     np.testing.assert_allclose(support_point(geom_model("cylinder")[0], 0, down), [0, 0, -0.3])

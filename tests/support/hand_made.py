@@ -7,6 +7,15 @@ from scipy.sparse.linalg import eigsh
 from ripple_sim.solver import TexelMesh, TexelTopology, glue
 
 RIM = (-1, -1)
+INNER = slice(1, -1)  # a chart's own texels within its halo
+# of each side, south, east, north and west: the halo's places beyond it, and the texels beside it
+SIDES = (
+    ((0, INNER), (1, INNER)),
+    ((INNER, -1), (INNER, -2)),
+    ((-1, INNER), (-2, INNER)),
+    ((INNER, 0), (INNER, 1)),
+)
+CORNERS = ((0, 0), (0, -1), (-1, -1), (-1, 0))  # halo places beyond the corners of a chart
 
 
 def _corners_to_places(corners: np.ndarray, topology: TexelTopology) -> np.ndarray:
@@ -15,37 +24,51 @@ def _corners_to_places(corners: np.ndarray, topology: TexelTopology) -> np.ndarr
     Beyond a rim lies the point of the rim that is nearest to the texel: there the waves' natural
     boundary is exact.
     """
-    n = topology.shape[1]
-    u = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
-    s = u[None, None, :, None]
-    t = u[None, :, None, None]
-    a, b, c, d = (corners[:, k, None, None] for k in range(4))
-    places = (1 - s) * (1 - t) * a + s * (1 - t) * b + s * t * c + (1 - s) * t * d
-    for side, (rim, texel) in enumerate(
-        (((0, slice(1, -1)), (1, slice(1, -1))), ((slice(1, -1), -1), (slice(1, -1), -2)),
-         ((-1, slice(1, -1)), (-2, slice(1, -1))), ((slice(1, -1), 0), (slice(1, -1), 1)))
-    ):  # fmt: skip
-        along = corners[:, (side + 1) % 4] - corners[:, side]
-        along = along / np.linalg.norm(along, axis=1, keepdims=True)
-        offset = places[:, *texel] - corners[:, side, None]
-        places[:, *rim] = (
-            corners[:, side, None]
-            + np.einsum("cij,cj->ci", offset, along)[..., None] * along[:, None]
-        )
-    texels = places[:, 1:-1, 1:-1].reshape(-1, 3)
-    shown = ~topology.own & ~topology.rim & (topology.halo >= 0)
-    places[shown] = texels[topology.halo[shown]]
-    # beyond a rim and a glued side lies the rim's point beside the neighbour's corner texel
+    places = _bilinear(corners, topology.shape[1])
+    for side, (rim, texel) in enumerate(SIDES):
+        start = corners[:, side]
+        end = corners[:, (side + 1) % 4]
+        places[:, *rim] = _nearest_on_lines(places[:, *texel], start, end)
+    texels = places[:, INNER, INNER].reshape(-1, 3)
+    copied = ~topology.own & ~topology.rim & (topology.halo >= 0)
+    places[copied] = texels[topology.halo[copied]]
     for chart, corner in np.argwhere(topology.valence == 0):
-        row, column = ((0, 0), (0, -1), (-1, -1), (-1, 0))[corner]
-        other, r, c = np.unravel_index(topology.halo[chart, row, column], topology.shape)
-        if topology.rim[chart, row, column] and other != chart:
-            out_r, out_c = (0 if x == 0 else n + 1 for x in (r, c))
-            along_rows = topology.rim[other, out_r, c + 1]
-            places[chart, row, column] = (
-                places[other, out_r, c + 1] if along_rows else places[other, r + 1, out_c]
-            )
+        _place_beyond_corner(places, topology, chart, CORNERS[corner])
     return places
+
+
+def _bilinear(corners: np.ndarray, n: int) -> np.ndarray:
+    """Texel centres between corners [C, 4, 3], with the rim beyond them, [C, n + 2, n + 2, 3]."""
+    along_side = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
+    s = along_side[None, None, :, None]
+    t = along_side[None, :, None, None]
+    a, b, c, d = (corners[:, k, None, None] for k in range(4))
+    return (1 - s) * (1 - t) * a + s * (1 - t) * b + s * t * c + (1 - s) * t * d
+
+
+def _nearest_on_lines(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Nearest points of lines from start to end [C, 3] to points [C, k, 3]."""
+    along = end - start
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    distance = np.einsum("cij,cj->ci", points - start[:, None], along)
+    return start[:, None] + distance[..., None] * along[:, None]
+
+
+def _place_beyond_corner(
+    places: np.ndarray, topology: TexelTopology, chart: int, corner: tuple[int, int]
+) -> None:
+    """Beyond a rim and a glued side lies the rim's point beside the neighbour's corner texel."""
+    n = topology.shape[1]
+    row, column = corner
+    other, r, c = np.unravel_index(topology.halo[chart, row, column], topology.shape)
+    if not topology.rim[chart, row, column] or other == chart:
+        return
+    beyond_row = 0 if r == 0 else n + 1
+    beyond_column = 0 if c == 0 else n + 1
+    if topology.rim[other, beyond_row, c + 1]:
+        places[chart, row, column] = places[other, beyond_row, c + 1]
+    else:
+        places[chart, row, column] = places[other, r + 1, beyond_column]
 
 
 def flat_charts(corners, glued, n: int) -> TexelMesh:
@@ -71,7 +94,7 @@ def aslant(n: int, slope: float) -> TexelMesh:
 
 
 def polygon(sides: int, n: int) -> TexelMesh:
-    """Regular polygon with free edges, cut into charts from its centre: that many meet there."""
+    """Regular polygon with free edges, cut from its centre into a chart for each corner."""
     angle = 2 * np.pi * np.arange(sides) / sides
     tips = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     middles = (tips + np.roll(tips, -1, axis=0)) / 2
@@ -120,17 +143,17 @@ def flat_torus(n: int) -> TexelMesh:
 
 
 def two_squares(n: int) -> TexelMesh:
-    """Two unit squares, one above the other, that have nothing to do with each other."""
+    """Two unit squares, one above the other, without links between them."""
     lower = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     return flat_charts([lower, lower + np.array([0, 0, 1])], [[RIM] * 4] * 2, n)
 
 
 def eigenvalues(texels: TexelMesh, count: int) -> np.ndarray:
-    """Least squares of the angular frequencies, at wave speed 1."""
+    """Least squared angular frequencies at wave speed 1."""
     mass = diags_array(texels.areas.ravel())
     start = np.random.default_rng(0).standard_normal(mass.shape[0])
-    # some more than asked for, to full precision: round-off alone shows the second of two equal
-    # ones
+    # four more than asked for, to full precision: only round-off shows the second of two equal
+    # eigenvalues
     found = eigsh(
         texels.stiffness(), count + 4, mass.tocsc(), sigma=-0.1, v0=start, return_eigenvectors=False
     )
@@ -138,6 +161,6 @@ def eigenvalues(texels: TexelMesh, count: int) -> np.ndarray:
 
 
 def square_eigenvalues(rim: str) -> np.ndarray:
-    """Of the unit square, at wave speed 1: the lowest of them, in ascending order."""
+    """The lowest eigenvalues of the unit square at wave speed 1, in ascending order."""
     first = 1 if rim == "fixed" else 0
     return np.sort([np.pi**2 * (a * a + b * b) for a in range(first, 9) for b in range(first, 9)])
