@@ -32,7 +32,7 @@ from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.kernel import Floats, Ints
 from ripple_sim.solver.waves.finite import count_substeps
-from ripple_sim.solver.waves.sensor import filtered, hertz
+from ripple_sim.solver.waves.sensor import filtered, hertz, trusted_frequency
 
 # of dry air at 20 degrees Celsius [kg/m^3]
 DENSITY = 1.204
@@ -100,6 +100,20 @@ class Microphone:
                     f"({_LOWEST_AUDIBLE:g} Hz); a speed of {ringing:.2g} m/s would ring at 200 Hz"
                 )
 
+    @property
+    def bandwidth(self) -> float:
+        """Frequency [Hz] up to which the sound can be trusted, as a sensor's `bandwidth`.
+
+        It is that of the widest texels, in samples for each second of the simulation.
+        """
+        limits = []
+        for name, ear in self._ears.items():
+            waves = self._ripples[name]
+            widest = [int(waves.rest.areas.argmax())]
+            rate = min(self.rate, 1 / ear.substep)
+            limits.append(trusted_frequency(waves.rest, waves.material, widest, rate))
+        return min(limits)
+
     def place(self, data: mujoco.MjData, point: NDArray[np.float64]) -> None:
         """Move to a point in the world [m], [3].
 
@@ -155,10 +169,15 @@ class Ear:
     waves : WaveSolver
     timestep : float
         Of the steps that the waves take [s].
+
+    Attributes
+    ----------
+    substep : float
+        Of the waves [s].
     """
 
     def __init__(self, waves: WaveSolver, timestep: float) -> None:
-        self._dt = timestep / count_substeps(timestep, waves.stable_timestep, None)
+        self.substep = timestep / count_substeps(timestep, waves.stable_timestep, None)
         self._series = np.zeros(0)  # what is heard at the surface's middle, one value a substep
         self._now: Placement | None = None
         self._before: Placement | None = None
@@ -199,11 +218,11 @@ class Ear:
 
     def take(self, time: float, dt: float, sums: NDArray[np.float32]) -> None:
         """Add what the substeps of dt [s] from a time on give, later by their delays."""
-        changes = np.diff(sums.astype(np.float64), axis=0, prepend=self._last[None]) / self._dt
+        changes = np.diff(sums.astype(np.float64), axis=0, prepend=self._last[None]) / self.substep
         self._last = sums[-1].astype(np.float64)
         # a change happens in the middle of its substep, and so do the series' entries
         middles = time + dt * (np.arange(len(sums)) + 0.5)
-        when = middles / self._dt - 0.5
+        when = middles / self.substep - 0.5
         if self._before is not None:
             count = len(self._before.delays)
             faded = self._faded(middles)[:, None]
@@ -214,7 +233,7 @@ class Ear:
             self._series = np.append(
                 self._series, np.zeros(max(size, 2 * len(self._series)) - len(self._series))
             )
-        if abs(dt - self._dt) < 1e-9 * dt:
+        if abs(dt - self.substep) < 1e-9 * dt:
             first = round(when[0])
             each = np.ascontiguousarray(changes.T)
             for delay, change in zip((first + self._delays).tolist(), each, strict=True):
@@ -239,16 +258,16 @@ class Ear:
             [np.interp(at, self._times, each) for each in np.transpose(self._ways)], axis=1
         )
         left_at = at - (np.linalg.norm(ways, axis=1) - self._reach) / SPEED
-        reach = np.zeros(max(len(self._series), int(left_at.max() / self._dt) + 2) + 64)
+        reach = np.zeros(max(len(self._series), int(left_at.max() / self.substep) + 2) + 64)
         reach[: len(self._series)] = self._series
-        times = (np.arange(len(reach)) + 0.5) * self._dt
-        base = min(rate, 1 / self._dt)
+        times = (np.arange(len(reach)) + 0.5) * self.substep
+        base = min(rate, 1 / self.substep)
         # nothing is heard before the beginning
         begun = left_at > times[0]
         pressure = np.zeros(len(at))
         if begun.any():
             blocks = np.array_split(left_at[begun], max(1, len(at) // 4096))
-            spans = np.full(len(times), self._dt)
+            spans = np.full(len(times), self.substep)
             heard = [
                 filtered(times, spans, reach[:, None], block, base)[:, 0]
                 for block in blocks
@@ -276,9 +295,9 @@ class Ear:
         texels = np.flatnonzero(weight * waves.operator.movable.reshape(-1))
         if not len(texels):
             texels = np.zeros(1, np.int64)  # it faces away everywhere: a texel without weight
-        every = max(1, int(1 / (2 * RATE * self._dt)))  # substeps from one delay to the next
+        every = max(1, int(1 / (2 * RATE * self.substep)))  # substeps from one delay to the next
         own = np.maximum(distance[texels] - common + self._reach, 0.0)
-        delay = own / SPEED / (every * self._dt)
+        delay = own / SPEED / (every * self.substep)
         first = np.floor(delay).astype(np.int64)
         slots = np.concatenate([first, first + 1])
         late = delay - first
@@ -308,6 +327,13 @@ def gain(pressure: NDArray[np.float64]) -> float:
     """By what a pressure [Pa] is multiplied so that it just does not clip."""
     peak = float(np.abs(pressure).max(initial=0.0))
     return _PEAK_LEVEL / peak if peak > 0 else 1.0
+
+
+def scale_note(signals: NDArray, unit: str, bandwidth: float) -> str:
+    """What a sample of a sound file means, and up to which frequency [Hz] it is right."""
+    if not signals.any():
+        return "silent"
+    return f"a sample of 1 is {1 / gain(signals):.3g} {unit}, trusted up to {bandwidth:.3g} Hz"
 
 
 def write_wav(path: Path, signals: NDArray, rate: int) -> None:

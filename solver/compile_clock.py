@@ -1,7 +1,8 @@
 """Time spent on compiling kernels, apart from the time spent on work.
 
 A kernel is compiled at its first call, which takes seconds, once on each machine. `compile_times`
-and `compiling` say which modules are compiled; `work_clock` leaves the compilation out.
+and `compiling` say which modules are compiled, `stage_of` what their kernels compute; `work_clock`
+leaves the compilation out.
 
 numba tells of compilations by the events of `numba.core.event`.
 """
@@ -16,8 +17,20 @@ from typing import Any
 
 from numba.core import event
 
-# Kernels are compiled in silence for this long [s]; then a warning says why it takes so long.
+# Kernels are compiled in silence for this long [s]; then warnings say why it takes so long.
 _SILENT_SECONDS = 2.0
+
+# What the kernels of a package compute, in a user's words. The longest matching name is taken.
+_STAGES = {
+    "ripple_sim.solver.layouts.sphere_map": "the sphere map",
+    "ripple_sim.solver.layouts.patches": "the charts",
+    "ripple_sim.solver": "the atlas",
+    "ripple_sim.solver.operator": "the wave operator",
+    "ripple_sim.solver.backends": "the wave step",
+    "ripple_sim.solver.waves": "loads and height maps",
+    "ripple_sim.coupling": "the contacts",
+    "ripple_sim.render": "the renderer",
+}
 
 _log = logging.getLogger("ripple_sim")
 
@@ -35,7 +48,7 @@ class _CompileListener(event.Listener):
         # module that is being compiled, and when it began; numba compiles one kernel at a time
         self.running: tuple[str, float] | None = None
         self.own = threading.local()  # of this thread: depth of nested compilations, seconds
-        self.warned = False
+        self.named: set[str] = set()  # stages that a warning has named
         self._collected_before = False  # whether the garbage collector was on
 
     def on_start(self, event: Any) -> None:
@@ -45,13 +58,12 @@ class _CompileListener(event.Listener):
             return
         self._collected_before = gc.isenabled()
         gc.disable()
-        self.running = event.data["dispatcher"].py_func.__module__, time.perf_counter()
-        if not self.warned and sum(self.seconds.values()) > _SILENT_SECONDS:
-            self.warned = True
-            _log.warning(
-                "compiling for this machine, once; it may take a minute, and later runs load what "
-                "is made"
-            )
+        module = event.data["dispatcher"].py_func.__module__
+        self.running = module, time.perf_counter()
+        stage = stage_of(module)
+        if stage not in self.named and sum(self.seconds.values()) > _SILENT_SECONDS:
+            self.named.add(stage)
+            _log.warning("compiling %s for this machine, once; later runs load it", stage)
 
     def on_end(self, event: Any) -> None:
         """A kernel has been compiled."""
@@ -65,6 +77,12 @@ class _CompileListener(event.Listener):
         self.seconds[module] = self.seconds.get(module, 0.0) + spent
         self.own.seconds = getattr(self.own, "seconds", 0.0) + spent
         self.running = None
+
+
+def stage_of(module: str) -> str:
+    """A phrase for users: what the kernels of a module compute, or else the module's name."""
+    fitting = [package for package in _STAGES if f"{module}.".startswith(f"{package}.")]
+    return _STAGES[max(fitting, key=len)] if fitting else module
 
 
 _listener = _CompileListener()

@@ -1,6 +1,7 @@
 """Sensors of scene files: checked, exported, stored by batches, drawn."""
 
 import csv
+import re
 import wave
 from pathlib import Path
 
@@ -70,7 +71,13 @@ def test_exports_hold_the_samples(tmp_path: Path, samples) -> None:
             pytest.importorskip({"parquet": "pyarrow"}.get(ending, ending))
         export_scene(scene, tmp_path / f"a.{ending}", ExportOptions(signals=True, **OPTIONS))
         # over what was made here
-        export_scene(scene, tmp_path / f"a.{ending}", ExportOptions(signals=True, **OPTIONS))
+        summary = export_scene(
+            scene, tmp_path / f"a.{ending}", ExportOptions(signals=True, **OPTIONS)
+        )
+        if ending == "wav":
+            note = re.match(r"a sample of 1 is (\S+) m/s.*, trusted up to (\S+) Hz", summary.note)
+            assert float(note[1]) == pytest.approx(np.abs(both).max() / 0.9, rel=5e-3)
+            assert 0 < float(note[2]) <= 0.34 * 500
     with wave.open(str(tmp_path / "a.wav")) as file:
         assert (file.getnchannels(), file.getframerate(), file.getnframes()) == (3, 500, len(both))
         codes = np.frombuffer(file.readframes(len(both)), "<i2").reshape(-1, 3) / 32767
@@ -97,9 +104,10 @@ def test_exports_hold_the_samples(tmp_path: Path, samples) -> None:
 
 
 def test_a_wav_without_sensors_is_the_sound_at_the_camera(tmp_path: Path) -> None:
-    export_scene(
+    summary = export_scene(
         scene_of(tmp_path, ""), tmp_path / "a.wav", ExportOptions(slow_motion=2.0, **OPTIONS)
     )
+    assert re.fullmatch(r"a sample of 1 is \S+ Pa, trusted up to \S+ Hz", summary.note)
     content = (tmp_path / "a.wav").read_bytes()
     assert MARK.encode() in content[:200]
     with wave.open(str(tmp_path / "a.wav")) as file:

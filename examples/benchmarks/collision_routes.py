@@ -155,6 +155,8 @@ def drop(route: str, kind: str, drops: int) -> Result:
             ]
             times += [spent] if impulses else []
         thrown = max(thrown, touched * float(np.linalg.norm(data.qvel[:3])) / SPEED)
+    if not times:  # so few bodies that all flew past
+        return Result(np.array(place), np.nan, np.nan, np.nan)
     return Result(np.array(place), given / lost, thrown, float(np.median(times)))
 
 

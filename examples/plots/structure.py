@@ -56,10 +56,14 @@ def walk() -> list[str]:
         [sys.executable, "-c", TRACE],
         capture_output=True,
         text=True,
-        check=True,
         env=environment,
         cwd=ROOT,
     )
+    if done.returncode:
+        sys.exit(
+            f"{sys.executable} cannot trace a step: {done.stderr.strip().splitlines()[-1]}; run "
+            "this with the Python in which ripple-sim is installed, such as .venv/bin/python"
+        )
     paths = json.loads(done.stdout.splitlines()[-1])
     roots = {(ROOT / folder).resolve(): folder for folder in ("solver", "ripple_sim")}
     return [

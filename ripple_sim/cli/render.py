@@ -41,17 +41,8 @@ if TYPE_CHECKING:
 # [s]: a job that ends within this time prints no progress into a pipe or a log
 _SILENT_TIME = 10.0
 
-# What the kernels of a package compute, in a user's words. The longest matching name is taken.
-_STAGES = {
-    "ripple_sim.solver.layouts.sphere_map": "the sphere map",
-    "ripple_sim.solver.layouts.patches": "the charts",
-    "ripple_sim.solver": "the atlas",
-    "ripple_sim.solver.operator": "the wave operator",
-    "ripple_sim.solver.backends": "the wave step",
-    "ripple_sim.solver.waves": "loads and height maps",
-    "ripple_sim.coupling": "the contacts",
-    "ripple_sim.render": "the renderer",
-}
+# [s]: compilations that take less are not told of
+_MIN_COMPILE_TIME = 0.05
 
 
 # The commands inherit fields, defaults and help texts from the options. A field is repeated here if
@@ -116,31 +107,41 @@ class ExportCommand(_SceneCommand, ExportOptions):
         print(
             f"{summary.output}: {summary.frames} {'frame' if summary.frames == 1 else 'frames'}"
             f"{f', {size / 1e6:.1f} MB' if size else ''}\n"
+            f"{_sound_line(summary.note)}"
             f"stages    simulation {summary.simulate_seconds:.1f} s, writing "
             f"{summary.write_seconds:.1f} s"
         )
+
+
+def _sound_line(note: str) -> str:
+    """The line of a summary on the sound, if there is any."""
+    return f"sound     {note}\n" if note else ""
 
 
 class _Rate(ProgressColumn):
     """The rate, or the kernels being compiled and the seconds so far."""
 
     def render(self, task: Task) -> Text:
-        from ripple_sim.solver.compile_clock import compile_times, compiling
+        from ripple_sim.solver.compile_clock import compiling, stage_of
 
         module = compiling()
         if module is None:
             return Text(
                 f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed"
             )
-        stage = _stage(module)
-        seconds = sum(time for each, time in compile_times().items() if _stage(each) == stage)
-        return Text(f"compiling {stage} (once): {seconds:.0f} s")
+        stage = stage_of(module)
+        return Text(f"compiling {stage} (once): {_compile_times()[stage]:.0f} s")
 
 
-def _stage(module: str) -> str:
-    """A phrase for users: what the kernels of a module compute."""
-    fitting = [package for package in _STAGES if f"{module}.".startswith(f"{package}.")]
-    return _STAGES[max(fitting, key=len)] if fitting else module
+def _compile_times() -> dict[str, float]:
+    """Time spent on compiling, by what the kernels compute [s]."""
+    from ripple_sim.solver.compile_clock import compile_times, stage_of
+
+    times: dict[str, float] = {}
+    for module, seconds in compile_times().items():
+        stage = stage_of(module)
+        times[stage] = times.get(stage, 0.0) + seconds
+    return times
 
 
 def _progress_lines() -> Callable[[int, int], None]:
@@ -248,15 +249,15 @@ class _VideoCommand(_SceneCommand, VideoOptions):
             if summary.resumed_at
             else ""
         )
-        compiling = (
-            f"compiling (once) {summary.compile_seconds:.1f} s, "
-            if summary.compile_seconds >= 0.05
-            else ""
-        )
+        compiling = ""
+        if summary.compile_seconds >= _MIN_COMPILE_TIME:
+            compiled = [name for name, time in _compile_times().items() if time > _MIN_COMPILE_TIME]
+            compiling = f"compiling {', '.join(compiled)} (once) {summary.compile_seconds:.1f} s, "
         print(
             f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
             f"renderer  {summary.renderer}\n"
             f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
+            f"{_sound_line(summary.sound)}"
             f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics "
             f"{summary.physics_seconds:.1f} s, waves {summary.wave_seconds:.1f} s, rendering "
             f"{summary.render_seconds:.1f} s, encoding {summary.encode_seconds:.1f} s"

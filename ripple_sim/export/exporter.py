@@ -224,6 +224,11 @@ class Exporter:
         finally:
             self.discard()
 
+    @property
+    def note(self) -> str:
+        """What there is to know of the complete file, such as the scale of a sound."""
+        return self._writer.note
+
     def discard(self) -> str:
         """Stop, and remove the unfinished file; say which files are kept for resuming, if any.
 
@@ -293,13 +298,15 @@ def framed(page: Path, aspect: float) -> str:
 class ExportSummary:
     """Number of frames of an export, and the times that it took [s].
 
-    For pictures by Cycles `write_seconds` is the time that Cycles took.
+    For pictures by Cycles `write_seconds` is the time that Cycles took. `note` says what else there
+    is to know of the file: the scale of a sound, and up to which frequency it is right.
     """
 
     output: Path
     frames: int
     simulate_seconds: float
     write_seconds: float
+    note: str = ""
 
 
 @checked(
@@ -393,7 +400,7 @@ def export_scene(
             write_seconds = write_seconds + time.perf_counter() - done
             if progress is not None:
                 progress(number + 1, frames)
-    return ExportSummary(Path(output), frames, simulate_seconds, write_seconds)
+    return ExportSummary(Path(output), frames, simulate_seconds, write_seconds, exporter.note)
 
 
 def _export_moment(

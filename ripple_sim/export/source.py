@@ -99,6 +99,9 @@ class Source:
 class Writer(Protocol):
     """Writes a run to a file or folder, frame by frame; it is made with its source and path."""
 
+    # what there is to say of the complete file, in a line of the summary
+    note: str = ""
+
     _file: Any = None  # the file that is open all the time, if there is one
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:

@@ -11,7 +11,8 @@ import numpy as np
 from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.encode.replace import MARK
 from ripple_sim.errors import ExportError
-from ripple_sim.sound import Microphone, gain, write_wav
+from ripple_sim.solver.waves.sensor import UNITS
+from ripple_sim.sound import Microphone, gain, scale_note, write_wav
 
 from .source import Source, Writer
 
@@ -50,6 +51,8 @@ class WavWriter(Writer):
         if self._microphone is not None:
             signals = self._microphone.pressure(self._frames / (source.fps * source.slow_motion))
             rate = self._microphone.rate
+            unit = "Pa"
+            bandwidth = self._microphone.bandwidth
         else:
             sampled = [sensor.samples for sensor in source.sensors.values()]
             # the last samples of sensors on coarser surfaces come later
@@ -57,6 +60,9 @@ class WavWriter(Writer):
             channels = [samples[:count] for samples in sampled]
             signals = np.concatenate(channels, axis=1).astype(np.float64)
             rate = next(iter(source.sensors.values())).rate
+            unit = " or ".join(dict.fromkeys(UNITS[each.kind] for each in source.sensors.values()))
+            bandwidth = min(sensor.bandwidth for sensor in source.sensors.values())
+        self.note = scale_note(signals, unit, bandwidth / source.slow_motion)
         write_wav(self._path, signals * gain(signals), round(rate / source.slow_motion))
 
 

@@ -42,7 +42,7 @@ from ripple_sim.simulation import Simulation
 from ripple_sim.solver.compile_clock import compile_times, work_clock
 from ripple_sim.solver.errors import FUNCTION, PATH, checked, instance, user_line, work_for
 from ripple_sim.solver.gl import GLContext
-from ripple_sim.sound import Microphone, gain
+from ripple_sim.sound import Microphone, gain, scale_note
 
 from .options import VideoOptions
 from .settings import (
@@ -364,7 +364,8 @@ class Summary:
     The frames before `resumed_at` existed already. `renderer` is the driver's GL_RENDERER,
     `backend` the backend of the wave solver. The times of the stages [s] add up to more than
     `wall_seconds`, because the stages overlap. `compile_seconds`, for kernels that are used for the
-    first time on a machine, is not part of the stages' times.
+    first time on a machine, is not part of the stages' times. `sound` says what a sample of the
+    sound is, and up to which frequency it is right, if there is a sound.
     """
 
     output: Path
@@ -380,6 +381,7 @@ class Summary:
     render_seconds: float
     encode_seconds: float
     wall_seconds: float
+    sound: str = ""
 
 
 Progress = Callable[[int, int], None]
@@ -449,6 +451,7 @@ def render_video(
         ]
         on_frames = [] if on_frame is None else [on_frame]
         microphone = None
+        sound = ""
         if options.sound:
             microphone = Microphone(simulations[0].ripples, options.slow_motion)
             on_frames.append(microphone.follow)
@@ -461,6 +464,7 @@ def render_video(
         if microphone is not None:
             pressure = microphone.pressure(frames / options.rate)
             writer.sound = pressure * gain(pressure)
+            sound = scale_note(pressure, "Pa", microphone.bandwidth / options.slow_motion)
     substeps = sum(simulation.substeps_taken for simulation in simulations)
     return Summary(
         output=writer.path,
@@ -476,6 +480,7 @@ def render_video(
         render_seconds=film.seconds,
         encode_seconds=writer.encode_seconds,
         wall_seconds=time.perf_counter() - start,
+        sound=sound,
     )
 
 

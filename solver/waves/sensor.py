@@ -8,7 +8,7 @@ does not depend on when it is read.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -187,8 +187,7 @@ class Sensor:
         )
         # where substeps are longer than samples there is nothing between substeps to filter out
         self._base = min(self.rate, 1 / operator.longest_timestep)
-        shortest = (_resolved(atlas, material, int(center)) for center in centers)
-        self.bandwidth = min(*shortest, _PASSED_SHARE * self._base)
+        self.bandwidth = trusted_frequency(atlas, material, centers, self._base)
         self.begin(0.0, np.zeros(len(texels)))
 
     @property
@@ -382,6 +381,17 @@ def _row(
         return texels, solved[0]
     second_derivatives = solved[orders.index((0, 2))] + solved[orders.index((2, 0))]
     return texels, laplacian * 2 * second_derivatives / size**2
+
+
+def trusted_frequency(
+    atlas: Atlas, material: Material, centers: Iterable[int], rate: float
+) -> float:
+    """Frequency [Hz] up to which samples are right, taken at a rate [1/s] round given texels.
+
+    The texels carry the waves up to there, and the filter passes them.
+    """
+    resolved = (_resolved(atlas, material, int(center)) for center in centers)
+    return min(*resolved, _PASSED_SHARE * rate)
 
 
 def _resolved(atlas: Atlas, material: Material, center: int) -> float:
