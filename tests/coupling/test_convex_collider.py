@@ -181,7 +181,7 @@ def test_an_open_mesh_is_refused_with_the_routes_that_take_it() -> None:
     V, F = ell()
     lid = V[F].mean(axis=1)[:, 2] > 0.3 - 1e-9
     with pytest.raises(
-        RippleError, match=r"mesh of geom 'target' is open .* routes for it are 'flex' and 'hull'"
+        RippleError, match=r"mesh of geom 'target' is open .* its routes are 'flex' and 'hull'"
     ):
         make_collidable(mesh_spec((V, F[~lid]), None, None), "target", "convex")
 
