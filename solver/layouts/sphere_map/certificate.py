@@ -17,11 +17,28 @@ from ...kernel import Floats, kernel
 from ...mesh.topology import triangle_areas
 from ...mesh.vectors import Vector, cross, dot, row, subtract
 
-EPSILON = float(np.finfo(np.float64).eps)
-CANDIDATES = 400  # rotations; the cube's own symmetries make that 8 degrees from one to the next
-SHARPNESS = 8  # the power of the squared narrowness that stands for its maximum
-LEAST_SQUARE = 1e-6  # of a width: triangles without area are not narrow texels
-NEGLIGIBLE = 1e-2  # share of the narrowness that no rotation need look at
+# A triple product counts as positive above this share of the product of two sides: round-off.
+_MIN_TRIPLE_PRODUCT = 4.0 * float(np.finfo(np.float64).eps)
+
+# Greatest difference of a squared length from 1, and of the sum of solid angles from 4 pi [sr].
+_UNIT_TOLERANCE = 1e-9
+_SOLID_ANGLE_TOLERANCE = 1e-6
+
+# Rotations that are tried. The cube's own symmetries make that 8 degrees from one to the next.
+_ROTATIONS = 400
+
+# Power of the squared narrowness whose sum stands for the greatest narrowness.
+_SHARPNESS = 8
+
+# Least squared width of a texel: triangles without area are no narrow texels.
+_MIN_SQUARED_WIDTH = 1e-6
+
+# Vertices that add up to this share of the narrowness need not be looked at.
+_NEGLIGIBLE_SHARE = 1e-2
+
+# Constants of the super-Fibonacci spirals (Alexa 2022): phi^2 = 2 and psi^4 = psi + 4.
+_SPIRAL_PHI = np.sqrt(2)
+_SPIRAL_PSI = 1.533751168755204288
 
 
 @dataclass(frozen=True)
@@ -43,11 +60,12 @@ def certify(F: NDArray[np.integer], S: Floats) -> Certificate:
     ab = subtract(b, a)
     ac = subtract(c, a)
     triple = dot(a, cross(ab, ac))
-    flipped = np.count_nonzero(~(triple > 4.0 * EPSILON * np.sqrt(dot(ab, ab) * dot(ac, ac))))
-    solid_angle = np.sum(solid_angles(F, S))
-    on_sphere = bool(np.all(np.abs(dot(S.T, S.T) - 1) < 1e-9))
-    valid = flipped == 0 and on_sphere and abs(solid_angle - 4 * np.pi) < 1e-6
-    return Certificate(int(flipped), float(solid_angle), bool(valid))
+    sides = np.sqrt(dot(ab, ab) * dot(ac, ac))
+    flipped = int(np.count_nonzero(~(triple > _MIN_TRIPLE_PRODUCT * sides)))
+    solid_angle = float(np.sum(solid_angles(F, S)))
+    is_on_sphere = bool(np.all(np.abs(dot(S.T, S.T) - 1) < _UNIT_TOLERANCE))
+    covers_once = abs(solid_angle - 4 * np.pi) < _SOLID_ANGLE_TOLERANCE
+    return Certificate(flipped, solid_angle, flipped == 0 and is_on_sphere and covers_once)
 
 
 def solid_angles(F: NDArray[np.integer], S: Floats) -> Floats:
@@ -66,9 +84,8 @@ def stretch(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     How many times wider than in an ideal even grid the texels are there.
     """
     real = triangle_areas(V, F)
-    return np.sqrt(
-        4 * np.pi / np.sum(real) * real / np.maximum(solid_angles(F, S), np.finfo(np.float64).tiny)
-    )
+    on_sphere = np.maximum(solid_angles(F, S), np.finfo(np.float64).tiny)
+    return np.sqrt(4 * np.pi / np.sum(real) * real / on_sphere)
 
 
 def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
@@ -82,20 +99,21 @@ def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     determinant = (trace * trace - squares) / 2
     # the larger eigenvalue of the 2 x 2 matrices; over the determinant, it is one over the smaller
     upper = 0.5 * (trace + np.sqrt(np.maximum(trace * trace - 4 * determinant, 0)))
-    narrowest = area * (upper / np.maximum(determinant, LEAST_SQUARE * upper)) ** SHARPNESS
-    order = np.argsort(-narrowest, kind="stable")
-    count = (
-        int(np.searchsorted(np.cumsum(narrowest[order]), (1 - NEGLIGIBLE) * np.sum(narrowest))) + 1
-    )
-    narrow = S[order[:count]], metric[order[:count]], area[order[:count]]
+    inverse_square = upper / np.maximum(determinant, _MIN_SQUARED_WIDTH * upper)
+    narrowness = area * inverse_square**_SHARPNESS
+    # the narrowest vertices, which make up nearly all of the sum
+    order = np.argsort(-narrowness, kind="stable")
+    needed = (1 - _NEGLIGIBLE_SHARE) * np.sum(narrowness)
+    count = int(np.searchsorted(np.cumsum(narrowness[order]), needed)) + 1
+    narrow = order[:count]
     least = np.inf
-    widest = np.eye(3)
-    for rotation in spread_rotations(CANDIDATES):
-        narrowness = _narrowness(rotation, *narrow, least)
-        if narrowness < least:
-            least = narrowness
-            widest = rotation
-    return S @ widest.T
+    best_rotation = np.eye(3)
+    for rotation in spread_rotations(_ROTATIONS):
+        total = _narrowness(rotation, S[narrow], metric[narrow], area[narrow], least)
+        if total < least:
+            least = total
+            best_rotation = rotation
+    return S @ best_rotation.T
 
 
 def spread_rotations(count: int) -> Floats:
@@ -106,8 +124,9 @@ def spread_rotations(count: int) -> Floats:
     s = np.arange(count) + 0.5
     inner = np.sqrt(s / count)
     outer = np.sqrt(1 - s / count)
-    alpha = 2 * np.pi * s / np.sqrt(2)
-    beta = 2 * np.pi * s / 1.533751168755204288
+    alpha = 2 * np.pi * s / _SPIRAL_PHI
+    beta = 2 * np.pi * s / _SPIRAL_PSI
+    # a unit quaternion x, y, z, w
     x = inner * np.sin(alpha)
     y = inner * np.cos(alpha)
     z = outer * np.sin(beta)
@@ -127,14 +146,14 @@ def _vertex_metrics(F: NDArray[np.integer], V: Floats, S: Floats) -> tuple[Float
 
     The average lets a sliver count no more than it covers.
     """
-    (i, j, k), (real_i, real_j, real_k) = ([P[F[:, c]].T for c in range(3)] for P in (S, V))
-    e = subtract(j, i)
-    g = subtract(k, i)
-    real_e = subtract(real_j, real_i)
-    real_g = subtract(real_k, real_i)
+    # two sides of each triangle, on the sphere and on the real surface
+    e = subtract(S[F[:, 1]].T, S[F[:, 0]].T)
+    g = subtract(S[F[:, 2]].T, S[F[:, 0]].T)
+    real_e = subtract(V[F[:, 1]].T, V[F[:, 0]].T)
+    real_g = subtract(V[F[:, 2]].T, V[F[:, 0]].T)
     normal = cross(e, g)
     square = dot(normal, normal)
-    # over the square: one along e and zero along g, and vice versa
+    # these over the square: one along e and zero along g, and vice versa
     p = cross(g, normal)
     q = cross(normal, e)
     ee = dot(real_e, real_e)
@@ -147,17 +166,15 @@ def _vertex_metrics(F: NDArray[np.integer], V: Floats, S: Floats) -> tuple[Float
         return np.bincount(F.ravel(), np.repeat(values, 3), len(V)).astype(np.float64)
 
     area = at_vertices(share)
-    sums = [
-        at_vertices(
-            scale * (ee * p[a] * p[b] + eg * (p[a] * q[b] + q[a] * p[b]) + gg * q[a] * q[b])
-        )
-        for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    ]
+    sums = []
+    for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
+        entry = ee * p[a] * p[b] + eg * (p[a] * q[b] + q[a] * p[b]) + gg * q[a] * q[b]
+        sums.append(at_vertices(scale * entry))
     return np.stack(sums, axis=1) / area[:, None], area
 
 
 @kernel
-def _aligned_product(m: Floats, a: Vector, b: Vector) -> float:
+def _product(m: Floats, a: Vector, b: Vector) -> float:
     """A . M b for a symmetric matrix M given as xx yy zz xy xz yz, [6]."""
     return (
         m[0] * a[0] * b[0]
@@ -173,9 +190,7 @@ def _aligned_product(m: Floats, a: Vector, b: Vector) -> float:
 def _narrowness(rotation: Floats, S: Floats, metric: Floats, area: Floats, limit: float) -> float:
     """Sum over the sphere of (1 / least width of a texel)^16.
 
-    The cube's axes are the rows of `rotation`.
-
-    Once it is above `limit` the rest is left out.
+    The cube's axes are the rows of `rotation`. Once the sum is above `limit` the rest is left out.
     """
     total = 0.0
     for v in range(len(S)):
@@ -183,31 +198,33 @@ def _narrowness(rotation: Floats, S: Floats, metric: Floats, area: Floats, limit
         x = dot(row(rotation, 0), p)
         y = dot(row(rotation, 1), p)
         z = dot(row(rotation, 2), p)
+        local = (x, y, z)
+        # the axis of the chart, and those of its columns and rows
         main = 0 if abs(x) >= max(abs(y), abs(z)) else 1 if abs(y) >= abs(z) else 2
         along = (main + 1) % 3
         across = (main + 2) % 3
-        local = (x, y, z)
         depth = abs(local[main])
-        # from the direction (u, v, 1) depth: its slope in the texel's angle, arctan u, is (e_u - u
-        # depth p) / cos^2
-        a = local[along] / depth
-        b = local[across] / depth
+        # The point p is the direction (u, v, 1) depth. Its slope in the texel's angle, arctan u, is
+        # (e_u - u depth p) / cos^2.
+        s = local[along]
+        t = local[across]
+        a = s / depth
+        b = t / depth
         du = depth * (1.0 + a * a)
         dv = depth * (1.0 + b * b)
         e = row(rotation, along)
         g = row(rotation, across)
-        s = local[along]
-        t = local[across]
         first = (du * (e[0] - s * p[0]), du * (e[1] - s * p[1]), du * (e[2] - s * p[2]))
         second = (dv * (g[0] - t * p[0]), dv * (g[1] - t * p[1]), dv * (g[2] - t * p[2]))
         m = metric[v]
-        ee = _aligned_product(m, first, first)
-        gg = _aligned_product(m, second, second)
-        eg = _aligned_product(m, first, second)
+        ee = _product(m, first, first)
+        gg = _product(m, second, second)
+        eg = _product(m, first, second)
         trace = ee + gg
         determinant = ee * gg - eg * eg
         upper = 0.5 * (trace + np.sqrt(max(trace * trace - 4.0 * determinant, 0.0)))
-        total += area[v] * (upper / max(determinant, LEAST_SQUARE * upper)) ** SHARPNESS
+        inverse_square = upper / max(determinant, _MIN_SQUARED_WIDTH * upper)
+        total += area[v] * inverse_square**_SHARPNESS
         if total > limit:
             break
     return total

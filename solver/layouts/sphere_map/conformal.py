@@ -25,7 +25,10 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Triangles = NDArray[np.integer]
 
-SOUTHERN_SHARE = 0.1  # of the vertices, far from the cut, stay where the harmonic map has put them
+# Share of the vertices, far from the cut, that stay where the harmonic map has put them; and how
+# many do at least.
+_SOUTHERN_SHARE = 0.1
+_MIN_SOUTHERN_VERTICES = 3
 
 
 def conformal_sphere_map(V: Real, F: Triangles) -> Real:
@@ -68,16 +71,16 @@ def _harmonic_map(V: Real, F: Triangles) -> Real:
 
     It is the most regular triangle.
     """
-    sides = np.stack(
-        [np.linalg.norm(V[F[:, (j + 2) % 3]] - V[F[:, (j + 1) % 3]], axis=1) for j in range(3)],
-        axis=1,
-    )
+    corners_of = V[F]
+    opposite_sides = np.roll(corners_of, -2, axis=1) - np.roll(corners_of, -1, axis=1)
+    sides = np.linalg.norm(opposite_sides, axis=2)
     cut = int(np.argmin(np.ptp(sides, axis=1) / np.sum(sides, axis=1)))
+    # the cut triangle in the plane: its first side lies along the real axis
     a, b, c = V[F[cut]]
-    across = (c - a) @ (b - a) / np.linalg.norm(b - a)
-    corners = np.array(
-        [0, np.linalg.norm(b - a), across + 1j * np.sqrt((c - a) @ (c - a) - across**2)]
-    )
+    base = np.linalg.norm(b - a)
+    foot = (c - a) @ (b - a) / base
+    height = np.sqrt((c - a) @ (c - a) - foot**2)
+    corners = np.array([0, base, foot + 1j * height])
     # each triangle in a plane of its own: the sides from its first corner to the second and third
     u = V[F[:, 1]] - V[F[:, 0]]
     v = V[F[:, 2]] - V[F[:, 0]]
@@ -85,14 +88,16 @@ def _harmonic_map(V: Real, F: Triangles) -> Real:
     unit = np.ones(len(F))
     e = length + 0j
     f = (np.einsum("ij,ij->i", u, v) + 1j * np.linalg.norm(np.cross(u, v), axis=1)) / length
-    plane = _solve_dirichlet(_stiffness(e, f, unit, 0 * unit, unit, F, len(V)), F[cut], corners)
+    laplacian = _stiffness(e, f, unit, 0 * unit, unit, F, len(V))
+    plane = _solve_dirichlet(laplacian, F[cut], corners)
     plane -= plane.mean()
 
     # scale the plane so that the triangles at the two poles come out alike
     south = _from_south(_to_sphere(plane))
     by_radius = np.argsort(np.sum(np.abs(plane[F]), axis=1), kind="stable")
     inner = by_radius[0] if by_radius[0] != cut else by_radius[1]
-    return _to_sphere(plane * np.sqrt(_perimeter(south[F[inner]]) / _perimeter(plane[F[cut]])))
+    ratio = _perimeter(south[F[inner]]) / _perimeter(plane[F[cut]])
+    return _to_sphere(plane * np.sqrt(ratio))
 
 
 def _repair_north(V: Real, F: Triangles, S: Real) -> Real:
@@ -105,7 +110,10 @@ def _repair_north(V: Real, F: Triangles, S: Real) -> Real:
     det = e.real * f.imag - e.imag * f.real
     dx = (u * f.imag[:, None] - v * e.imag[:, None]) / det[:, None]
     dy = (v * e.real[:, None] - u * f.real[:, None]) / det[:, None]
-    xx, xy, yy = (np.einsum("ij,ij->i", p, q) for p, q in ((dx, dx), (dx, dy), (dy, dy)))
+    # the metric of the mesh in the plane
+    xx = np.einsum("ij,ij->i", dx, dx)
+    xy = np.einsum("ij,ij->i", dx, dy)
+    yy = np.einsum("ij,ij->i", dy, dy)
     # Beltrami coefficient of the map from the plane to the mesh
     beltrami = (xx - yy + 2j * xy) / (xx + yy + 2 * np.sqrt(np.maximum(xx * yy - xy * xy, 0)))
     rho = beltrami.real
@@ -120,8 +128,10 @@ def _repair_north(V: Real, F: Triangles, S: Real) -> Real:
         F,
         len(V),
     )
-    southern = np.argsort(S[:, 2], kind="stable")[: max(round(SOUTHERN_SHARE * len(V)), 3)]
-    return _to_sphere(_solve_dirichlet(stiffness, southern, plane[southern])) * [1, 1, -1]
+    count = max(round(_SOUTHERN_SHARE * len(V)), _MIN_SOUTHERN_VERTICES)
+    southern = np.argsort(S[:, 2], kind="stable")[:count]
+    repaired = _solve_dirichlet(stiffness, southern, plane[southern])
+    return _to_sphere(repaired) * [1, 1, -1]
 
 
 def _stiffness(

@@ -21,11 +21,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel import Bools, Floats, Ints32, kernel, shared
-from ...mesh.vectors import cross, dot, row, subtract
+from ...mesh.vectors import Vector, cross, dot, row, subtract
 
-ROUND_SHARE = 0.15  # of the vertices left, removed in one round
-COMFORTABLE_DEGREE = 8
-DEGREE_LIMIT = 12  # of a merged vertex, raised where nothing else is left to collapse
+# Share of the remaining vertices that one round removes.
+_ROUND_SHARE = 0.15
+
+# Greatest degree of a merged vertex, which is raised where nothing else is left to collapse; and
+# the degree beyond which a collapse costs half as much again for each further neighbour.
+_MAX_DEGREE = 12
+_COMFORTABLE_DEGREE = 8
+_COST_OF_A_DEGREE = 0.5
+
+# Squared lengths below this share of the mean squared edge count as equal.
+_BLUR = 1e-4
+
+# Vertices of a tetrahedron.
+_LAST_VERTICES = 4
 
 
 class CornerTable(NamedTuple):
@@ -140,12 +151,13 @@ def vertex_quadrics(tail: Ints32, V: Floats) -> Floats:
     normal = cross(subtract(q, p), subtract(r, p))
     twice_area = np.sqrt(dot(normal, normal))
     with np.errstate(invalid="ignore", divide="ignore"):
-        x, y, z = (np.where(twice_area > 0.0, each / twice_area, 0.0) for each in normal)
+        x, y, z = (np.where(twice_area > 0.0, along / twice_area, 0.0) for along in normal)
+    # the triangle's plane is x X + y Y + z Z + d = 0
     d = -dot((x, y, z), p)
     terms = (x * x, x * y, x * z, y * y, y * z, z * z, x * d, y * d, z * d, d * d)
-    return np.stack(
-        [np.bincount(tail, np.repeat(0.5 * twice_area * each, 3), len(V)) for each in terms], axis=1
-    )
+    area = 0.5 * twice_area
+    columns = [np.bincount(tail, np.repeat(area * term, 3), len(V)) for term in terms]
+    return np.stack(columns, axis=1)
 
 
 class _Front(NamedTuple):
@@ -167,39 +179,46 @@ def decimate(table: CornerTable, V: Floats) -> Ints32:
     Returns the collapsed half-edges in order, [n - 4].
     """
     edges = V[table.tail] - V[table.tail[table.twin]]
-    blur = 1e-4 * float(np.mean(np.sum(edges * edges, axis=1)))
+    blur = _BLUR * float(np.mean(np.sum(edges * edges, axis=1)))
     n = len(V)
-    log = np.empty(n - 4, np.int32)
+    log = np.empty(n - _LAST_VERTICES, np.int32)
     alive = np.arange(n, dtype=np.int32)
-    degree = np.bincount(table.tail, minlength=n).astype(np.int32)
-    stale = np.ones(n, np.bool_)
-    cost = np.full(n, np.inf)
-    target = np.full(n, -1, np.int32)
     front = _Front(
-        table, V, vertex_quadrics(table.tail, V), np.ones(n), degree, stale, cost, target
+        table=table,
+        V=V,
+        quadrics=vertex_quadrics(table.tail, V),
+        merged=np.ones(n),
+        degree=np.bincount(table.tail, minlength=n).astype(np.int32),
+        stale=np.ones(n, np.bool_),
+        cost=np.full(n, np.inf),
+        target=np.full(n, -1, np.int32),
     )
     done = 0
-    limit = DEGREE_LIMIT
+    max_degree = _MAX_DEGREE
     while done < len(log):
-        _price(alive, front, blur, limit)
-        order = alive[np.argsort(cost[alive], kind="stable")]
-        quota = min(len(log) - done, max(1, int(ROUND_SHARE * len(alive))))
-        removed = _collapse_round(order, quota, front, limit, log[done:])
+        _price(alive, front, blur, max_degree)
+        order = alive[np.argsort(front.cost[alive], kind="stable")]
+        quota = min(len(log) - done, max(1, int(_ROUND_SHARE * len(alive))))
+        removed = _collapse_round(order, quota, front, max_degree, log[done:])
         if removed == 0:
-            limit *= 2
-            stale[alive] = True
+            max_degree *= 2
+            front.stale[alive] = True
         done += removed
-        alive = alive[cost[alive] >= 0.0]
+        alive = alive[front.cost[alive] >= 0.0]
     return log
 
 
 @kernel
-def _price(alive: Ints32, front: _Front, blur: float, limit: int) -> None:
+def _price(alive: Ints32, front: _Front, blur: float, max_degree: int) -> None:
     """Find the cheapest legal collapse of every stale vertex.
 
     Squared lengths below `blur` count as equal.
     """
-    table, V, quadrics, merged, degree, stale, cost, target = front
+    table = front.table
+    V = front.V
+    degree = front.degree
+    stale = front.stale
+    cost = front.cost
     neighbours = np.empty(len(V), np.int32)
     mark = np.full(len(V), -1, np.int32)
     ring = np.empty((len(V), 3))
@@ -208,7 +227,7 @@ def _price(alive: Ints32, front: _Front, blur: float, limit: int) -> None:
             continue
         stale[u] = False
         cost[u] = np.inf
-        if degree[u] > limit + 1:
+        if degree[u] > max_degree + 1:
             continue
         gather_star(table, u, neighbours)
         position = row(V, u)
@@ -223,52 +242,59 @@ def _price(alive: Ints32, front: _Front, blur: float, limit: int) -> None:
             h = neighbours[i]
             v = table.tail[following(h)]
             merged_degree = size + degree[v] - 4
-            if merged_degree > limit:
+            if merged_degree > max_degree:
                 continue
+            # the longest edge, and the one that vanishes, squared
             p = row(ring, i)
             span = 0.0
             for j in range(size):
                 e = subtract(row(ring, j), p)
                 span = max(span, dot(e, e))
             e = subtract(position, p)
-            shape = (
-                (span + blur)
-                * (dot(e, e) + blur)
-                * (1.0 + 0.5 * max(merged_degree - COMFORTABLE_DEGREE, 0))
-            )
-            q = quadrics[u]
-            (x, y, z) = p
-            error = (
-                q[0] * x * x
-                + q[3] * y * y
-                + q[5] * z * z
-                + 2.0 * (q[1] * x * y + q[2] * x * z + q[4] * y * z)
-            )
-            error = error + 2.0 * (q[6] * x + q[7] * y + q[8] * z) + q[9]
-            price = shape + max(error, 0.0) + blur * blur * merged[u]
+            crowding = 1.0 + _COST_OF_A_DEGREE * max(merged_degree - _COMFORTABLE_DEGREE, 0)
+            shape = (span + blur) * (dot(e, e) + blur) * crowding
+            error = max(_quadric_error(front.quadrics[u], p), 0.0)
+            price = shape + error + blur * blur * front.merged[u]
             if price < least and is_collapsible(table, u, v, mark):
                 least = price
                 cheapest = h
         cost[u] = least
-        target[u] = cheapest
+        front.target[u] = cheapest
 
 
 @kernel
-def _collapse_round(order: Ints32, quota: int, front: _Front, limit: int, log: Ints32) -> int:
+def _quadric_error(q: Floats, p: Vector) -> float:
+    """Quadric [10] at a point; see `vertex_quadrics`."""
+    (x, y, z) = p
+    square = (
+        q[0] * x * x
+        + q[3] * y * y
+        + q[5] * z * z
+        + 2.0 * (q[1] * x * y + q[2] * x * z + q[4] * y * z)
+    )
+    return square + 2.0 * (q[6] * x + q[7] * y + q[8] * z) + q[9]
+
+
+@kernel
+def _collapse_round(order: Ints32, quota: int, front: _Front, max_degree: int, log: Ints32) -> int:
     """Collapse up to `quota` vertices in `order`, none of them beside another.
 
     A negative cost marks the vertices that are removed.
     """
-    table, _, quadrics, merged, degree, stale, cost, target = front
+    table = front.table
+    quadrics = front.quadrics
+    degree = front.degree
+    stale = front.stale
+    cost = front.cost
     star = np.empty(len(cost), np.int32)
     mark = np.full(len(cost), -1, np.int32)
     done = 0
     for u in order:
         if done == quota or cost[u] == np.inf:
             break
-        h = target[u]
+        h = front.target[u]
         v = table.tail[following(h)]
-        if stale[u] or degree[u] + degree[v] - 4 > limit:
+        if stale[u] or degree[u] + degree[v] - 4 > max_degree:
             stale[u] = True
             continue
         size = gather_star(table, u, star)
@@ -285,7 +311,7 @@ def _collapse_round(order: Ints32, quota: int, front: _Front, limit: int, log: I
         collapse(table, h)
         for k in range(quadrics.shape[1]):  # slices would take longer to compile
             quadrics[v, k] += quadrics[u, k]
-        merged[v] += merged[u]
+        front.merged[v] += front.merged[u]
         cost[u] = -1.0
         log[done] = h
         done += 1

@@ -21,7 +21,20 @@ from ...mesh.vectors import Vector, cross, dot, row, subtract
 from ..energy import Reference
 from .decimation import CornerTable, following, gather_star, preceding
 
-SMALLEST_SHARE = 1e-3  # of the mean reference area: no triangle gets less
+# Least area of a reference triangle, over the mean one.
+_MIN_AREA_SHARE = 1e-3
+
+# Least area that a level may show of a vertex, over the area that the vertex carries; and the
+# greatest load.
+_MIN_SHOWN_SHARE = 1e-12
+_MAX_LOAD = 1e6
+
+# Mean squared side below which a triangle is a point, on a surface of area 4 pi; its reference is
+# equilateral.
+_MIN_SQUARED_SIDE = 1e-28
+
+# Least square of four times an area, which divides.
+_MIN_SQUARED_AREA = 1e-300
 
 
 class Level(NamedTuple):
@@ -59,10 +72,10 @@ def build_level(
     end = star_start[1:]
     while len(h):  # one half-edge further counterclockwise round every vertex that has more
         star[place] = h
-        left = np.flatnonzero(place + 1 < end)
-        h = table.twin[preceding(h[left])]
-        place = place[left] + 1
-        end = end[left]
+        has_more = np.flatnonzero(place + 1 < end)
+        h = table.twin[preceding(h[has_more])]
+        place = place[has_more] + 1
+        end = end[has_more]
     ring = vertex_number[table.tail[table.twin[star]]]
     return Level(tail, edge, ends, star_start, ring, corner_number[star])
 
@@ -121,7 +134,8 @@ def update_load(v: int, star: Ints32, degree: int, tail: Ints32, surface: RealSu
         h = 3 * (star[i] // 3)
         shown += _area(row(V, tail[h]), row(V, tail[h + 1]), row(V, tail[h + 2]))
     carried = surface.carried[v]
-    surface.load[v] = min(carried / max(shown / 3.0, 1e-12 * carried), 1e6)
+    own_share = max(shown / 3.0, _MIN_SHOWN_SHARE * carried)
+    surface.load[v] = min(carried / own_share, _MAX_LOAD)
 
 
 @kernel
@@ -133,6 +147,7 @@ def update_triangle(f: int, tail: Ints32, surface: RealSurface, reference: Refer
     a = row(surface.V, u)
     b = row(surface.V, v)
     c = row(surface.V, w)
+    # the squared sides, opposite to the corners
     e0 = subtract(c, b)
     e1 = subtract(a, c)
     e2 = subtract(b, a)
@@ -140,24 +155,22 @@ def update_triangle(f: int, tail: Ints32, surface: RealSurface, reference: Refer
     q1 = dot(e1, e1)
     q2 = dot(e2, e2)
     real = _area(a, b, c)
-    third = (q0 + q1 + q2) / 3.0
-    if third > 1e-28:
-        quality = 4.0 / np.sqrt(3.0) * real / third
+    mean_square = (q0 + q1 + q2) / 3.0
+    if mean_square > _MIN_SQUARED_SIDE:
+        quality = 4.0 / np.sqrt(3.0) * real / mean_square
         pull = max(1.0 - min(quality / surface.sliver, 1.0), 1.0 - surface.trust)
-        q0 = q0 + pull * (third - q0)
-        q1 = q1 + pull * (third - q1)
-        q2 = q2 + pull * (third - q2)
+        q0 = q0 + pull * (mean_square - q0)
+        q1 = q1 + pull * (mean_square - q1)
+        q2 = q2 + pull * (mean_square - q2)
     else:
         q0 = q1 = q2 = 1.0
-    area = max(
-        real * (surface.load[u] + surface.load[v] + surface.load[w]) / 3.0,
-        SMALLEST_SHARE * surface.mean,
-    )
+    loads = surface.load[u] + surface.load[v] + surface.load[w]
+    area = max(real * loads / 3.0, _MIN_AREA_SHARE * surface.mean)
     if surface.trust < 1.0:
         area = area**surface.trust * surface.mean ** (1.0 - surface.trust)
-    four_areas = np.sqrt(
-        max(2.0 * (q0 * q1 + q1 * q2 + q2 * q0) - (q0 * q0 + q1 * q1 + q2 * q2), 1e-300)
-    )
+    # Heron's formula, and cotangents by the law of cosines
+    products = 2.0 * (q0 * q1 + q1 * q2 + q2 * q0)
+    four_areas = np.sqrt(max(products - (q0 * q0 + q1 * q1 + q2 * q2), _MIN_SQUARED_AREA))
     scale = 0.5 / (four_areas * area)
     reference.area[f] = area
     reference.cotangent[3 * f] = scale * (q1 + q2 - q0)
