@@ -5,13 +5,9 @@ from .build import (
     load_atlas as load_atlas,
 )
 from .energy import (
-    ARMIJO as ARMIJO,
     COLUMN as COLUMN,
     FIXED as FIXED,
-    FOLDED as FOLDED,
     FREE as FREE,
-    MOST_TRIALS as MOST_TRIALS,
-    REACH as REACH,
     ROW as ROW,
     TERMS as TERMS,
     Density as Density,

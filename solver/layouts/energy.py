@@ -2,8 +2,8 @@
 
 For the map from a reference triangle (area A) with singular values s1 >= s2, let
 
-    D = s1^2 + s2^2  = sum of cotangent times squared side over 2 A,   J = s1 s2 = (a x b . c) / 2
-    A.
+    D = s1^2 + s2^2 = sum of cotangent times squared side over 2 A,
+    J = s1 s2 = (a x b . c) / 2 A.
 
 On the unit sphere J takes the triple product of the triangle's three unit vectors in place of its
 area: it vanishes exactly where the triangle folds over. Charts are the plane z = 1, where the
@@ -23,10 +23,36 @@ import numpy as np
 from ..kernel import Floats, kernel
 from ..mesh.vectors import Vector, combine, cross, dot, row, subtract
 
-FOLDED = 1e-16  # a triple product must exceed this
-REACH = 0.3  # longest step of a vertex: radians on the sphere, or charts
-MOST_TRIALS = 14
-ARMIJO = 1e-4  # share of the fall that the slope promises
+# A triangle is folded unless its triple product is greater than this.
+MIN_TRIPLE_PRODUCT = 1e-16
+
+# Longest step of a vertex: radians on the sphere, or charts.
+_MAX_STEP = 0.3
+
+# Trial steps of a line search, at most, and the factor from one to the next of a single vertex.
+MAX_TRIALS = 14
+_SHORTER = 0.35
+
+# Share of the fall that the slope promises, which a step must bring (Armijo's condition).
+_MIN_FALL_SHARE = 1e-4
+
+# Fall that the slope must promise, over the energy: less is round-off.
+_MIN_PROMISED_FALL = 1e-13
+
+# Square of b = (s1 - s2) / 2 over the square of a = (s1 + s2) / 2 below which b has no direction.
+_MIN_SQUARED_RATIO = 1e-10
+
+# Determinant of a 2 x 2 Hessian, over its squared mean eigenvalue, above which its inverse is taken
+# as it is.
+_MIN_DETERMINANT = 1e-3
+
+# Least eigenvalue of a Hessian over the greatest, where its inverse is taken by eigenvectors.
+_MIN_EIGENVALUE_SHARE = 1e-4
+
+# Keeps a division by a second derivative finite.
+_MIN_CURVATURE = 1e-300
+
+# Numbers of a triangle in the expansion of a star, see `expand_star`.
 TERMS = 9
 
 
@@ -52,8 +78,9 @@ class Reference(NamedTuple):
     density: Density
 
 
-# W_D and W_J; then the Hessian is the second of D, the second of J, and gD gD^T, gD gJ^T + gJ gD^T
-# and gJ gJ^T with the gradients gD and gJ, in these shares
+# Energy derivatives of a triangle times its area: W_D and W_J, which make its gradient, and the
+# factors that make its Hessian: of the second derivatives of D and of J, and of gD gD^T,
+# gD gJ^T + gJ gD^T and gJ gJ^T, with the gradients gD and gJ of D and J.
 Shares: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
@@ -128,7 +155,7 @@ def projected_hessian(
     flip = max(flip, 0.0)
     along_aa = 0.25 * (haa - twist) / aa
     along_bb = along_ab = 0.0
-    if bb > 1e-10 * aa:  # else b has no direction
+    if bb > _MIN_SQUARED_RATIO * aa:
         along_bb = 0.25 * (hbb - flip) / bb
         along_ab = 0.25 * hab / root
     dd = (along_aa + 2.0 * along_ab + along_bb) / 16.0
@@ -147,11 +174,12 @@ def projected_hessian(
     )
 
 
-FIXED, COLUMN, ROW, FREE = range(4)  # in which directions a vertex may move: none, x, y, both
+# Directions in which a vertex may move: none, x, y, both.
+FIXED, COLUMN, ROW, FREE = range(4)
 
-# what is known of a triangle: J and D at rest, their slopes (that of J along p is J itself), half
-# of D's second derivative, and the reference area
-J, JX, JY, D, DX, DY, DZ, BEND, AREA = range(9)
+# The numbers of a triangle in the expansion of a star: J and D at rest, their slopes (that of J
+# along p is J itself), half of D's second derivative, and the reference area.
+J, JX, JY, D, DX, DY, DZ, BEND, AREA = range(TERMS)
 
 
 @kernel
@@ -204,7 +232,7 @@ def star_energy(terms: Floats, degree: int, density: Density, move: Vector) -> f
     for i in range(degree):
         area = terms[i, AREA]
         jacobian = terms[i, J] * (1.0 + dz) + terms[i, JX] * dx + terms[i, JY] * dy
-        if not 2.0 * area * jacobian > FOLDED:
+        if not 2.0 * area * jacobian > MIN_TRIPLE_PRODUCT:
             return np.inf
         dirichlet = (
             terms[i, D]
@@ -223,16 +251,14 @@ def star_slopes(
 ) -> tuple[float, float, float, float, float, float]:
     """Energy, gradient x, y and Hessian xx, xy, yy of a star with its vertex at rest.
 
-    The energy is infinite if a triangle is folded.
-
-    With a curvature of 1, on the sphere, a tangent step also falls towards the centre, and the
-    Hessian loses the radial slope; charts have 0.
+    The energy is infinite if a triangle is folded. With a curvature of 1, on the sphere, a tangent
+    step also falls towards the centre, and the Hessian loses the radial slope; charts have 0.
     """
     energy = gx = gy = radial = hxx = hxy = hyy = 0.0
     for i in range(degree):
         area = terms[i, AREA]
         jacobian = terms[i, J]
-        if not 2.0 * area * jacobian > FOLDED:
+        if not 2.0 * area * jacobian > MIN_TRIPLE_PRODUCT:
             return np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
         w, wd, wj, wdd, wdj, wjj = density_derivatives(terms[i, D], jacobian, density)
         dx = terms[i, DX]
@@ -263,7 +289,7 @@ def newton_direction(
     mean = 0.5 * (hxx + hyy)
     half = 0.5 * (hxx - hyy)
     determinant = hxx * hyy - hxy * hxy
-    if mean > 0.0 and determinant > 1e-3 * mean * mean:
+    if mean > 0.0 and determinant > _MIN_DETERMINANT * mean * mean:
         return (hxy * gy - hyy * gx) / determinant, (hxy * gx - hxx * gy) / determinant
     radius = np.sqrt(half * half + hxy * hxy)
     if radius > 0.0:
@@ -277,7 +303,7 @@ def newton_direction(
         uy = 0.0
     first = abs(mean + radius)
     second = abs(mean - radius)
-    floor = 1e-4 * max(first, second)
+    floor = _MIN_EIGENVALUE_SHARE * max(first, second)
     along = -(gx * ux + gy * uy) / max(first, floor)
     across = -(gy * ux - gx * uy) / max(second, floor)
     return along * ux - across * uy, along * uy + across * ux
@@ -306,19 +332,19 @@ def descend(
     if freedom == FREE:
         sx, sy = newton_direction(gx, gy, hxx, hxy, hyy)
     elif freedom == COLUMN:
-        sx = -gx / max(abs(hxx), 1e-300)
+        sx = -gx / max(abs(hxx), _MIN_CURVATURE)
         sy = 0.0
     else:
         sx = 0.0
-        sy = -gy / max(abs(hyy), 1e-300)
+        sy = -gy / max(abs(hyy), _MIN_CURVATURE)
     descent = -(gx * sx + gy * sy)
-    if not descent > 1e-13 * energy:
+    if not descent > _MIN_PROMISED_FALL * energy:
         return 0.0, stay
-    step = min(1.0, REACH / np.sqrt(sx * sx + sy * sy))
-    for _ in range(MOST_TRIALS):
+    step = min(1.0, _MAX_STEP / np.sqrt(sx * sx + sy * sy))
+    for _ in range(MAX_TRIALS):
         move = tangent_move(step * sx, step * sy, curvature)
         lower = star_energy(terms, degree, density, move)
-        if lower < energy - ARMIJO * step * descent:
+        if lower < energy - _MIN_FALL_SHARE * step * descent:
             further = 2.0 * lower < energy  # high up a wall a Newton step is far too short
             while further:
                 step *= 2.0
@@ -329,5 +355,5 @@ def descend(
                     move = ahead
                     lower = least
             return energy - lower, move
-        step *= 0.35
+        step *= _SHORTER
     return 0.0, stay

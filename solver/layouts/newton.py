@@ -19,13 +19,21 @@ import numpy as np
 
 from ..kernel import Floats, Ints32, kernel
 from ..mesh.vectors import Vector, combine, cross, dot, subtract
-from .energy import MOST_TRIALS, Reference, Shares, projected_hessian
+from .energy import MAX_TRIALS, Reference, Shares, projected_hessian
 
-# factors from one trial step to the next
-FURTHER = 1.6
-SHORTER = 0.6
+# Factors from one trial step to the next.
+_FURTHER = 1.6
+_SHORTER = 0.6
+
+# Residual at which conjugate gradients end, over the first one.
 CG_TOLERANCE = 0.03
-SHORT_STEP = 0.3  # a Newton step cut to less than this asks for fewer steps of conjugate gradients
+
+# A Newton step that is cut to less than this asks for fewer steps of conjugate gradients.
+_SHORT_STEP = 0.3
+
+# Determinant of a diagonal block, over the product of its diagonal, below which the block counts as
+# diagonal: less is round-off.
+_MIN_DETERMINANT_SHARE = 1e-14
 
 
 def descend_by_newton(
@@ -35,7 +43,7 @@ def descend_by_newton(
     stop: tuple[float, int, int],
     cg_range: tuple[int, int],
 ) -> None:
-    """Newton steps until they gain too little.
+    """Take Newton steps until they gain too little.
 
     Parameters
     ----------
@@ -52,20 +60,22 @@ def descend_by_newton(
     cg_range : int, int
         Steps of conjugate gradients, fewest and most.
     """
-    least_gain, patience, most = stop
-    cg_steps = cg_range[0]
-    failed = 0
-    for i in range(most):
+    least_gain, patience, most_steps = stop
+    fewest_cg_steps, most_cg_steps = cg_range
+    cg_steps = fewest_cg_steps
+    failures = 0
+    for i in range(most_steps):
         fall, step = newton_step(cg_steps)
-        if step < 1.0:
+        was_cut_short = step < 1.0
+        if was_cut_short:
             fall += sweep(i % 2 == 0)
-        failed = failed + 1 if fall < least_gain * energy() else 0
-        if failed == patience:
+        failures = failures + 1 if fall < least_gain * energy() else 0
+        if failures == patience:
             return
-        if step >= 1.0:
-            cg_steps = min(2 * cg_steps, cg_range[1])
-        elif step < SHORT_STEP:
-            cg_steps = max(cg_steps // 2, cg_range[0])
+        if not was_cut_short:
+            cg_steps = min(2 * cg_steps, most_cg_steps)
+        elif step < _SHORT_STEP:
+            cg_steps = max(cg_steps // 2, fewest_cg_steps)
 
 
 def line_search(
@@ -78,8 +88,9 @@ def line_search(
     """
     t = min(1.0, bound)
     lower = energy_at(t)
-    factor = FURTHER if energy - lower > -0.5 * t * slope else SHORTER
-    for _ in range(MOST_TRIALS):
+    fell_far = energy - lower > -0.5 * t * slope
+    factor = _FURTHER if fell_far else _SHORTER
+    for _ in range(MAX_TRIALS):
         if factor * t > bound:
             break
         trial = energy_at(factor * t)
@@ -106,11 +117,12 @@ class System(NamedTuple):
         return cls(np.zeros((vertices, 2)), np.zeros((vertices, 3)), np.zeros((edges, 4)))
 
 
-# of D and J along the two directions of a vertex, D_x, D_y, J_x, J_y; or what these are multiplied
-# with
+# Slopes of D and J along the two directions of a vertex: D_x, D_y, J_x, J_y; or the factors of
+# these slopes.
 Slopes: TypeAlias = tuple[float, float, float, float]
-# a corner of a triangle: the directions of its vertex, its slopes, and these combined as in the
-# outer products
+
+# A corner of a triangle: the two directions of its vertex, its slopes, and the factors of the
+# slopes of other corners in the outer products.
 Corner: TypeAlias = tuple[Vector, Vector, Slopes, Slopes]
 
 
@@ -255,7 +267,7 @@ def conjugate_gradients(ends: Ints32, system: System, steps: int, tolerance: flo
         b = diagonal[v, 1]
         c = diagonal[v, 2]
         det = a * c - b * b
-        if not det > 1e-14 * a * c:
+        if not det > _MIN_DETERMINANT_SHARE * a * c:
             b = 0.0
             det = a * c
         inverse[v, 0] = c / det

@@ -29,8 +29,8 @@ from ...kernel import Floats, Ints32, kernel
 from ...mesh.topology import triangle_areas
 from ...mesh.vectors import Vector, combine, cross, dot, row, subtract, unit
 from ..energy import (
-    FOLDED,
     FREE,
+    MIN_TRIPLE_PRODUCT,
     TERMS,
     Density,
     Reference,
@@ -173,7 +173,7 @@ def total_energy(tail: Ints32, S: Floats, reference: Reference) -> float:
         ac = subtract(c, a)
         bc = subtract(c, b)
         triple = dot(a, cross(ab, ac))
-        if not triple > FOLDED:
+        if not triple > MIN_TRIPLE_PRODUCT:
             return np.inf
         dirichlet = (
             cotangent[h] * dot(bc, bc)
