@@ -61,7 +61,7 @@ class StoreEntry(msgspec.Struct, forbid_unknown_fields=True):
     format: Literal["folders", "webdataset"] = "folders"
     """A folder a scene, or tar files of many scenes each."""
     scenes_per_tar: int = 100
-    """How many scenes a tar file holds."""
+    """Number of scenes in a tar file."""
 
 
 def video_name(store: StoreEntry) -> str | None:
@@ -84,11 +84,11 @@ class MeshesEntry(msgspec.Struct, forbid_unknown_fields=True):
     files: list[str]
     """Paths of files or folders, or patterns such as `meshes/*.obj`, relative to the plan."""
     bodies: int | Distribution = 12
-    """How many bodies drop."""
+    """Number of bodies that drop."""
     up: str | None = None
     """Axis of the files that points up: y or z; by default z for STL, else y."""
     look: str = "rubber"
-    """Of the targets."""
+    """Look of the targets."""
     repair: bool = False
     """Close the meshes' holes."""
     wrap: bool = False
@@ -102,7 +102,7 @@ class PlanFile(msgspec.Struct, forbid_unknown_fields=True):
     """
 
     count: int
-    """How many scenes are made."""
+    """Number of scenes."""
     scenes: list[str] = []
     """Names of shipped scenes, or paths of scene files, relative to the plan."""
     meshes: MeshesEntry | None = None
@@ -168,7 +168,7 @@ def read_plan(path: str | Path) -> Plan:
 
 
 def check_plan(plan: Plan) -> None:
-    """Make sure that scenes can be made and kept by a plan, before one is made.
+    """Check before the first scene that a plan can make and store its scenes.
 
     Raises `RippleError` with the key, its value and the expected values, or a missing package.
     """
@@ -217,7 +217,7 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
             )
         yield name if name in shipped else str(path.resolve())
     for pattern in content.meshes.files if content.meshes else ():
-        # files that fit; of folders those that hold a mesh by their endings
+        # files that fit the pattern, and in folders the files with a mesh's ending
         fitting = sorted(glob.glob(str(folder / pattern)))  # noqa: PTH207 - absolute ones too
         paths = [Path(name).resolve() for name in fitting]
         within = [file for path in paths if path.is_dir() for file in sorted(path.iterdir())]

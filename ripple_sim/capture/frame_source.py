@@ -30,7 +30,7 @@ _MAX_SPHERE_RESOLUTION = 32
 def surface_of(
     waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None
 ) -> Surface:
-    """The surface with which a target is drawn."""
+    """The surface that is drawn for a target."""
     atlas = waves.rest
     drawn = atlas
     if isinstance(atlas, SphereAtlas) and atlas.resolution > _MAX_SPHERE_RESOLUTION:
@@ -69,7 +69,7 @@ class FrameSource:
     ----------
     renderer : Renderer
     shown : ShownWaves
-        How high the waves were.
+        Heights of the waves in the pictures so far.
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class FrameSource:
         return self.fetch()
 
     def submit(self, snapshot: Snapshot) -> None:
-        """Draw a snapshot without waiting for it: `fetch` returns snapshots in their order."""
+        """Begin to draw a snapshot; `fetch` returns the frames in this order."""
         pose = self.camera(snapshot).pose()
         self.shown.look(snapshot.data, snapshot.heights, pose)
         lens_point = self._lens_points[snapshot.exposure]
@@ -128,7 +128,7 @@ class FrameSource:
         self.renderer.submit(snapshot.data, height_maps, pose, snapshot.exposure)
 
     def fetch(self) -> NDArray | None:
-        """Wait for the earliest snapshot submitted, and return what `render` does."""
+        """Wait for the earliest submitted snapshot; return the frame, or None as `render` does."""
         return self._exposure.expose(self.renderer.fetch())
 
     def sighting(self, snapshot: Snapshot) -> Sighting:

@@ -1,7 +1,7 @@
-"""Warnings of waves that are too high or too steep for the object that carries them.
+"""Warnings about waves that are too high or too steep for their object.
 
-Heights are compared with the local radius, slopes with 1. Each target is warned of once, with a
-material that would do.
+Heights are compared with the local radius, slopes with 1. There is one warning for each target; it
+names a material that avoids such waves.
 """
 
 from __future__ import annotations
@@ -22,35 +22,35 @@ from .ids import GeomId
 from .model import CoupledModel
 from .suited import Extent, bearing_density
 
-# The height allowed over the local radius.
+# Greatest allowed height over the local radius.
 _ALLOWED_HEIGHT = 0.25
 
-# The limit where the object is thinnest holds for this share of the texels; the rest is thinner.
+# Share of the texels for the limit "where the object is thinnest": the rest may be thinner.
 _THINNEST_SHARE = 0.99
 
-# Slopes are looked at on one row in so many.
+# Slopes are measured on one row in this many.
 _ROW_STRIDE = 4
 
-# Slopes beyond 1 are reported if more than this share of the surface has them: a pit under a hard
-# body is steep, but small.
+# Slopes above 1 are reported if they are on more than this share of the surface: a pit under a
+# hard body is steep, but small.
 _MIN_STEEP_AREA = 0.01
 
-# Steps between two looks at the crests of all steps so far, and at the slopes, by backend. They are
-# read back from a GPU for a look, which lets it run dry.
+# Steps between two checks of the slopes and of the crests of all steps so far, by backend. A check
+# reads them back from a GPU, which is idle meanwhile.
 _LOOK_INTERVAL = {"cpu": 16, "gl": 128}
 
-# A wave that is too high is followed for so many looks, or until it falls again, so that the advice
-# is based on its crest.
+# A wave that is too high is followed for this many checks, or until it falls again, so that the
+# advice is based on its crest.
 _FOLLOWED_LOOKS = 4
 
-# The density that is advised is this much more than the least for the waves that were seen.
+# Advised density over the least density for the waves so far.
 _DENSITY_MARGIN = 2.0
 
-# It is also enough for a wave of this share of the crest where the object is thinnest, since a wave
-# spreads.
+# The advised density also suffices for a wave of this share of the crest where the object is
+# thinnest, since waves spread.
 _SPREAD_SHARE = 0.3
 
-# Coefficients of a material that are printed; the others change no wave.
+# Coefficients of a material that the advice prints; the others change no wave.
 _PRINTED_FIELDS = tuple(
     field for field in dataclasses.fields(Material) if isinstance(field.default, float | bool)
 )
@@ -67,14 +67,14 @@ def scales_of(atlas: Atlas) -> tuple[Floats32, float, float]:
     per_thinnest : float
         1 over the greatest height allowed where the object is thinnest [1/m].
     calm : float
-        Waves that are no higher are neither too high nor too steep anywhere [m].
+        Waves up to this height are neither too high nor too steep anywhere [m].
     """
     fields = np.zeros((4, *atlas.areas.shape))
     fields[0] = 1 / (_ALLOWED_HEIGHT * half_thickness(atlas))
     for axis in (1, 2):
         spacing = np.linalg.norm(np.diff(atlas.positions, axis=axis), axis=-1)
         inner = (slice(None),) * axis + (slice(None, -1),)
-        # needles, on which a slope means little
+        # at least half the median: on needles a slope means little
         fields[axis][inner] = 1 / np.maximum(spacing, 0.5 * np.median(spacing))
     fields[3] = atlas.areas / atlas.areas.sum()
     thinnest = float(np.quantile(fields[0], _THINNEST_SHARE))
@@ -112,30 +112,30 @@ class AmplitudeCheck:
         self._steps = 0
 
     def __call__(self) -> None:
-        """Look at the heights, if it is time to. Call it after each step of the waves."""
+        """Check the heights if a check is due. Call it after each step of the waves."""
         for geom, watch in list(self._watched.items()):
             if self._steps % _LOOK_INTERVAL[watch.waves.backend] == 0 and watch.look():
                 self._warn(geom)
         self._steps += 1
 
     def ignore(self, geom: GeomId) -> None:
-        """Give no warning of a geom."""
+        """Turn the warning about a geom off."""
         self._watched.pop(geom, None)
 
     def watches(self, geom: GeomId) -> bool:
-        """Whether a geom may still be warned of."""
+        """Whether a warning about a geom may still come."""
         return geom in self._watched
 
     def waves_changed(self, geom: GeomId, waves: WaveSolver) -> None:
-        """Go on with the new waves of a geom."""
+        """Continue with the new waves of a geom."""
         if geom in self._watched:
             watch = self._watched[geom]
-            watch.look()  # at the old ones, a last time
+            watch.look()  # a last check of the old waves
             watch.waves = waves
             waves.crests()
 
     def flush(self) -> None:
-        """Look at the heights a last time, and warn of what was seen: the waves will end."""
+        """Check the heights a last time before the waves end, and give pending warnings."""
         for geom, watch in list(self._watched.items()):
             watch.look()
             if watch.excess > 1:
@@ -150,7 +150,7 @@ class AmplitudeCheck:
         )
 
     def _advice(self, geom: GeomId, waves: WaveSolver, factor: float) -> str:
-        """A material that would do, with a density higher by at least a factor."""
+        """Advice: a material whose density is higher by at least a factor."""
         material = waves.material
         values = {field.name: getattr(material, field.name) for field in _PRINTED_FIELDS}
         if any(np.ndim(value) for value in values.values()):
@@ -171,7 +171,7 @@ class AmplitudeCheck:
 
 
 class _WatchedTarget:
-    """The waves of one target, as far as they were looked at.
+    """The waves of one target, and the result of the checks so far.
 
     Attributes
     ----------
@@ -179,9 +179,9 @@ class _WatchedTarget:
     excess : float
         Greatest height and slope over the allowed ones.
     needed : float
-        By how much waves would have to be lower.
+        Factor by which waves would have to be lower.
     what : str
-        What was too large, how large, and where.
+        Words for the warning: the excess, its size and its place.
     """
 
     def __init__(self, waves: WaveSolver) -> None:
@@ -189,15 +189,15 @@ class _WatchedTarget:
         self.excess = 0.0
         self.needed = 0.0
         self.what = ""
-        # looks since the waves were too high or too steep for the first time
+        # checks since the waves were first too high or too steep
         self._looks = 0
-        # waves up to this height are right anywhere, or too small to matter [m]
+        # waves up to this height need no check [m]
         self._calm = 1e-3 * float(np.ptp(waves.rest.mesh.V, axis=0).max())
-        # see `scales_of`; computed when waves are higher for the first time
+        # see `scales_of`; computed when waves are first higher than `_calm`
         self._scales: tuple[Floats32, float] | None = None
 
     def look(self) -> bool:
-        """Whether the waves are too high or too steep, and it is time to say so."""
+        """Check the waves; True if they are too high or too steep, and the warning is due."""
         excess = 0.0
         crests = self.waves.crests()
         if float(crests.max()) > self._calm:
@@ -207,12 +207,12 @@ class _WatchedTarget:
         return self.excess > 1 and (excess < self.excess or self._looks >= _FOLLOWED_LOOKS)
 
     def _measure(self, crests: NDArray[np.float32], height: NDArray[np.float32]) -> float:
-        """Compare heights and slopes with what is allowed; return the greater excess."""
+        """Compare heights and slopes with the limits; return the greater excess."""
         if self._scales is None:
             fields, thinnest, self._calm = scales_of(self.waves.rest)
             self._scales = fields, thinnest
         (per_limit, per_row, per_column, share), per_thinnest = self._scales
-        # crests over the heights allowed there
+        # crests over the greatest allowed heights
         over = (crests * per_limit).reshape(-1)
         texel = int(over.argmax())
         high = float(over[texel])
@@ -252,6 +252,6 @@ def _steepness(height: Floats32, per_row: Floats32, per_column: Floats32, share:
 
 
 def _rounded_up(value: float) -> float:
-    """To two digits."""
+    """The value, rounded up to two digits."""
     step = 10.0 ** (math.floor(math.log10(value)) - 1)
     return math.ceil(value / step - 1e-9) * step

@@ -24,12 +24,12 @@ from .ids import ColliderId, TargetId
 
 _INTEGRATORS = mujoco.mjtIntegrator
 
-# Rounds in which the velocity at the beginning of a step is found from that at its end.
+# Rounds that find the velocity at the beginning of a step from the velocity at its end.
 _START_ROUNDS = 3
 
 # MuJoCo keeps impedances this far from 0 and 1: `mjMINIMP`.
 _MIN_IMPEDANCE = 1e-4
-# MuJoCo takes a `solimp` with a width below this for one of constant impedance [m]: `mjMINVAL`.
+# MuJoCo's impedance is constant if the width of a `solimp` is below this [m]: `mjMINVAL`.
 _MIN_WIDTH = 1e-15
 
 # Rounds in which contacts that share a footprint find their forces.
@@ -37,23 +37,24 @@ _SHARING_ROUNDS = 8
 # The rounds end where the velocities that the forces give differ by less than this share.
 _SHARING_TOLERANCE = 1e-4
 
-# Attempts in which pairs that cannot afford their forces get a share of them.
+# Attempts to lessen the forces of pairs that cannot afford them.
 _AFFORDING_ATTEMPTS = 6
-# From the second attempt on they get this part of the share that they can afford.
+# From the second attempt on a pair gets this part of the share that it can afford.
 _CAUTION = 0.95
-# The least share of a force, which all get in the last two attempts.
+# The least share of a force; in the last two attempts all pairs without cover get this share.
 _MIN_SHARE = 1e-9
 
-# A difference of works that is smaller than this share of the work is round-off.
+# A difference of two works below this share of the work is round-off.
 _WORK_ROUND_OFF = 1e-6
 
 # Acceleration that the rows of an open contact aim at [m/s^2]: any real one is greater, so that the
 # rows do not push.
 _OPEN_ACCELERATION = -1e10
 
-# A target, and the collider that touches it.
+# A pair: a target, and the collider that touches it.
 Key = tuple[TargetId, ColliderId]
-# The two of a pair in the order of their ids: two targets that touch each other are one account.
+# The energy account of a pair: its two ids in ascending order, since the two pairs of two targets
+# that touch each other share one account.
 Purse = tuple[ColliderId, ColliderId]
 
 
@@ -114,12 +115,12 @@ class VelocityChange:
 
     MuJoCo's integrators are implicit in joint damping, and some also in the gyroscopic terms of
     spinning bodies: velocities then change by another mass matrix than accelerations, and forces
-    that are taken back would leave a rest behind.
+    of the rigid solution, taken back, would leave a difference behind.
 
     Attributes
     ----------
     latest : float64 [nv], optional
-        The velocities with which the next step begins, unless somebody changes them.
+        The velocities with which the next step begins, unless the user changes them.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -379,8 +380,7 @@ class ContactProblem:
                 yields = sum(pair.mobility * total[pair.key] for pair in rows.pairs)
                 divisor = np.where(force[normal] > 0, force[normal], np.inf)
                 mobility = np.maximum(gained[normal] + yields, 0) / divisor
-                # with this much added to R, and all else as it is, a row bears the share of its
-                # force
+                # with this added to R, and other rows unchanged, a row carries its share
                 less = (1 - share) / share
                 softness[normal] += less * (self._R[normal] + softness[normal] + mobility)
         return self._total(force)
@@ -430,16 +430,16 @@ class ContactProblem:
         self._dual.set_compliance(data, R)
         for i, normal, all_rows, _ in self._contacts:
             if normal != all_rows:
-                # an elliptic cone: friction stays what it is
+                # an elliptic cone: keep the friction
                 ratio = R[normal.start + 1] / R[normal.start]
                 contact.mu[i] = contact.friction[i, 0] * np.sqrt(ratio)
 
     def _shared(self, force: Floats) -> Floats:
-        """Forces of all rows [N], found from a guess by turns.
+        """Forces of all rows [N], found from a guess in rounds.
 
-        The rows of a pair move the surface together: each by the sum F of their forces, while
-        MuJoCo's R is one number a row. With n rows R has n times the mobility m, and the reference
-        acceleration has the difference, m F - n m f, with the forces of the last round.
+        The surface under a pair moves by the sum F of the forces f of all its n rows, but MuJoCo's
+        R acts on the force of one row. So R gets n times the mobility m, and the reference
+        acceleration gets the difference m F - n m f, with the forces of the last round.
         """
         data = self._data
         for _ in range(_SHARING_ROUNDS):
@@ -480,7 +480,7 @@ class ContactProblem:
         return greatest_difference <= _SHARING_TOLERANCE * greatest
 
     def _affordable(self, force: Floats, paid: Mapping[Purse, float]) -> dict[Purse, float]:
-        """Shares of their forces that pairs can afford, by purse, where they cannot afford all.
+        """Share of its forces that each account can afford, where it cannot afford all.
 
         The work of a share s of a force is linear s + square s^2: the first part against the
         motion without the force, the second against the motion that the force itself makes.

@@ -1,4 +1,4 @@
-"""Animated WebPs, assembled from still ones.
+"""Animated WebP files, assembled from still images.
 
 The container is RIFF, see "WebP Container Specification" by Google: VP8X (size and flags), ANIM
 (background, loops), an ANMF chunk for each frame with the chunks of a still image, and XMP with the
@@ -19,23 +19,29 @@ _ANIMATION = 0x02
 _METADATA = 0x04
 _OPACITY = 0x10
 
-# flag of an ANMF chunk: the frame replaces the one before
+# flag of an ANMF chunk: the frame replaces the previous one
 _DO_NOT_BLEND = 0x02
+
+# byte of a VP8L chunk, and its bit, that say whether the image has opacity
+_LOSSLESS_FLAGS = 12
+_LOSSLESS_OPACITY = 0x10
 
 
 def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
-    """Make an endlessly looping WebP of still ones, all of the stream's size."""
+    """Join still WebP files of the stream's size to an animation that repeats for ever."""
     flags = _ANIMATION | _METADATA
     canvas = b"".join((side - 1).to_bytes(3, "little") for side in (stream.width, stream.height))
     with path.open("wb") as file:
-        # RIFF and VP8X, which come last: they hold the size and the flags
+        # room for RIFF and VP8X: they are written last, with the size and the flags
         file.write(bytes(12 + 8 + 10))
         file.write(riff_chunk(b"ANIM", struct.pack("<IH", 0, 0)))
         for number, still in enumerate(stills):
             # whole milliseconds, without accumulating the rounding error
             begin, end = (round(1000 * n / stream.fps) for n in (number, number + 1))
             image = _image_chunks(still.read_bytes())
-            if image.startswith(b"ALPH") or (image.startswith(b"VP8L") and image[12] & 0x10):
+            if image.startswith(b"ALPH") or (
+                image.startswith(b"VP8L") and image[_LOSSLESS_FLAGS] & _LOSSLESS_OPACITY
+            ):
                 flags |= _OPACITY
             header = (
                 bytes(6) + canvas + (end - begin).to_bytes(3, "little") + bytes([_DO_NOT_BLEND])

@@ -1,7 +1,7 @@
-"""The place of an export: it is written whole or not at all, and replaces nothing foreign.
+"""The place of an export: written whole or not at all, never over foreign files.
 
-`ENDINGS` lists the writers of the formats. The options of an export are checked here, too, before
-anything that takes time.
+`ENDINGS` lists the writers of the formats. This module also checks the options of an export, before
+any long work.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ LARGEST_MESH = 10_000_000  # triangles of a refined surface, at most
 
 
 class Unfinished:
-    """A hidden folder beside a target, in which an export is written and from which it is moved.
+    """A hidden folder beside a target: an export is written there and then moved.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ class Unfinished:
         self.path = self._folder / name
 
     def finish(self) -> None:
-        """Move everything to its place, unless something foreign stands there by now."""
-        # again: a run takes long
+        """Move everything to its place, unless a foreign file has appeared there."""
+        # a second check, since a run takes long
         _check_replaceable(self._target, self._recognised, self._overwrite)
         made = {".png": made_here, ".usdc": self._recognised}
 
@@ -79,7 +79,7 @@ class Unfinished:
             move(path, target)
 
     def remove(self) -> None:
-        """Remove the folder with all that is in it."""
+        """Remove the folder and its contents."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
@@ -191,15 +191,14 @@ def check_export(
     path : Path
     overwrite : bool
     chunked, timed, colored : bool
-        Whether the files are to be chunks of a run, show one time of it, or have the colours of
-        heights.
+        Whether the files shall be chunks of a run, show one time, or have colours by height.
 
     Raises
     ------
     ExportError
-        If the ending is unknown, needs what is not installed, cannot be what is asked for, or is
-        another where a link leads; something foreign stands in the path's place, or there can be no
-        such name.
+        If the ending is unknown, needs a package that is not installed, does not support the
+        options, or differs from that of a link's target; if a foreign file is in the place, or the
+        name is impossible.
     EncodingError
         If nothing can be written there.
     """
@@ -214,7 +213,7 @@ def check_export(
             raise ExportError(f"{option} is only for {valid}, not for {path.name}; leave it out")
     try:
         final = final_path(path)
-        # the writer, and `made_here`, go by the ending
+        # the ending chooses the writer and `made_here`
         if final.suffix.lower() != path.suffix.lower():
             raise ExportError(
                 f"output {str(path)!r} is a link to {final.name!r}: it must be a link to a name "
@@ -248,7 +247,7 @@ def check_options(options: ExportOptions) -> None:
 def check_written(
     size: tuple[int, int], tessellation: str, triangles: int, chunk: int | None
 ) -> None:
-    """Check the options of an export in a loop of one's own; raise `RippleError`."""
+    """Check the options of an export in a user's loop; raise `RippleError`."""
     check_size(*size)
     if not isinstance(triangles, int) or not 1 <= triangles <= LARGEST_MESH:
         raise ExportError(

@@ -1,8 +1,8 @@
 """Meetings of the threads that take a wave step together.
 
 Each thread runs the same kernel without the interpreter's lock. At a meeting a thread waits until
-all threads have come. A meeting takes a microsecond where each thread has a core of its own, a
-fiftieth of what a barrier of Python's takes.
+all threads have come. If each thread has its own core, a meeting takes a microsecond, a fiftieth
+of the time of Python's `threading.Barrier`.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ from numba.extending import intrinsic
 
 from ..kernel import Ints, kernel
 
-# Looks at the counter, a few microseconds in all, before a thread gives its core to others.
+# A waiting thread reads the counter this often, for a few microseconds in all, before it gives its
+# core to others.
 _EAGER_LOOKS = 5_000
 
 _ARRIVALS = 0  # element that counts how often threads have come to a meeting
-_ABANDONED = 1  # element that is not 0 where a thread will never come
+_ABANDONED = 1  # element that is not 0 if a thread will never come
 
-# Lets another thread have the core: a function of the system's library.
+# Gives the core to another thread: a function of the system's library.
 _give_way = types.ExternalFunction(
     "SwitchToThread" if os.name == "nt" else "sched_yield", types.int32()
 )
@@ -43,7 +44,7 @@ def alone() -> Crew:
 
 
 def abandon(counters: Ints) -> None:
-    """End all waiting: one of the threads does not come."""
+    """End all waiting, because a thread will not come."""
     counters[_ABANDONED] = 1
 
 
@@ -55,7 +56,7 @@ def _pointer(context: Any, builder: ir.IRBuilder, array_type: Any, array: Any, i
 
 @intrinsic
 def _add_one(typing_context, counters, index):
-    """Add 1 to an element, and return what it was, as one operation that nothing divides."""
+    """Add 1 to an element atomically, and return its former value."""
 
     def code(context, builder, signature, arguments):
         place = _pointer(context, builder, signature.args[0], *arguments)
@@ -66,7 +67,7 @@ def _add_one(typing_context, counters, index):
 
 @intrinsic
 def _look(typing_context, counters, index):
-    """The element as it is in memory now: what threads wrote before they changed it is seen."""
+    """Read an element from memory, with all writes of other threads before its last change."""
 
     def code(context, builder, signature, arguments):
         place = _pointer(context, builder, signature.args[0], *arguments)
@@ -77,7 +78,7 @@ def _look(typing_context, counters, index):
 
 @kernel(no_cpython_wrapper=True)
 def meet(crew: Crew) -> bool:
-    """Wait until all threads have come to this meeting; False where the step is abandoned."""
+    """Wait until all threads have come to this meeting; False if the step is abandoned."""
     if crew.size == 1:
         return True
     meetings_before = _add_one(crew.counters, _ARRIVALS) // crew.size

@@ -1,4 +1,4 @@
-"""`MovedMesh`: a mesh with its vertices elsewhere."""
+"""`MovedMesh`: a mesh with moved vertices."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from .mesh import Mesh
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class MovedMesh(Mesh):
-    """A mesh whose vertices have moved from where they are at rest.
+    """A mesh whose vertices have moved from their places at rest.
 
-    What the triangles alone decide is looked up in the mesh at rest, which computes it once.
+    Properties that depend on the triangles alone come from the mesh at rest, which computes them
+    once.
 
     Attributes
     ----------
     rest : Mesh
     moved_normals : float64 [vertex_count, 3]
-        Unit normals of the vertices where they are now.
+        Unit normals at the moved vertices.
     """
 
     rest: Mesh
@@ -63,5 +64,5 @@ class MovedMesh(Mesh):
 
     @functools.cached_property
     def vertex_normals(self) -> NDArray[np.float64]:
-        """Unit normals of the vertices where they are now, [vertex_count, 3]."""
+        """Unit normals at the moved vertices, [vertex_count, 3]."""
         return self.moved_normals

@@ -1,14 +1,13 @@
-"""Coefficients that suit an object's size and the hits on it, from how deep loads dent a surface.
+"""Coefficients for the size of an object and the hits on it, from the depth of dents.
 
-How far a surface gives way, and what stiffness or density keeps it from giving way further: a load
-F that is spread like a Gaussian of standard deviation s presses a membrane with a restoring
-stiffness in by
+A load F, spread like a Gaussian of standard deviation s, presses a membrane with a restoring
+stiffness k in by
 
     h = F / (4 pi sigma c^2) exp(z) E1(z),    z = s^2 k / (2 c^2),
 
-the integral of exp(-q^2 s^2 / 2) / (c^2 q^2 + k) over all wave numbers q. For the exponential
-integral this takes ln(1 + 1/z), which is an upper bound and can be inverted (Abramowitz and Stegun
-1964, 5.1.20).
+the integral of exp(-q^2 s^2 / 2) / (c^2 q^2 + k) over all wave numbers q. For exp(z) E1(z) this
+module takes ln(1 + 1/z), which is an upper bound and can be inverted (Abramowitz and Stegun 1964,
+5.1.20). The functions solve the equation for the depth, the stiffness or the density.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from .coefficients import require_positive
 # Standard deviation of a footprint (1 - (d/r)^2)^3 along an axis, over its radius r.
 SPREAD = 10**-0.5
 
-# Size over the length to which a dent narrows, c / sqrt(k).
+# Size of the object over the width of a dent, c / sqrt(k).
 NARROW = 16.0
 
 # Impulse of a hit over mass times speed: it bounces back with half its speed.
@@ -30,8 +29,8 @@ BOUNCE = 1.5
 # Radius of a footprint over the size of the object, unless it is given.
 _DEFAULT_RADIUS = 0.05
 
-# Least radius of a footprint over the size of the object; smaller footprints count as this large.
-# Texels do not resolve them, and their rings would not be seen.
+# Least radius of a footprint over the size of the object. Smaller footprints count as this large:
+# texels do not resolve them, and their rings would not be visible.
 FOOTPRINT = 0.025
 
 # Viscosity over the product of speed and size.
@@ -40,8 +39,8 @@ _VISCOSITY = 1e-3
 # [m/s^2]
 _GRAVITY = 9.81
 
-# Ratio of the load that tension bears to the load below which tension bears nothing, and above
-# which it bears everything, so that no stiffness is needed.
+# Ratio of the load that tension carries to the whole load: below the first tension carries nothing,
+# above the second it carries everything, and no stiffness is needed.
 _SLACK_RATIO = 1e-9
 _STIFF_RATIO = 100
 
@@ -53,7 +52,7 @@ _SHORT_HIT = 0.765
 def stiffness_under(
     force: float, depth: float, *, radius: float, density: float, speed: float
 ) -> float:
-    """Stiffness with which a resting load sinks by a depth at most [1/s^2].
+    """Stiffness at which a resting load sinks at most by a depth [1/s^2].
 
     Parameters
     ----------
@@ -78,7 +77,7 @@ def stiffness_under(
 def density_under(
     force: float, depth: float, *, radius: float, speed: float, stiffness: float
 ) -> float:
-    """Density with which a resting load sinks by a depth at most [kg/m^2].
+    """Density at which a resting load sinks at most by a depth [kg/m^2].
 
     Infinite without a stiffness. Arguments are as for `stiffness_under`; `stiffness` is the
     material's [1/s^2].
@@ -93,13 +92,13 @@ def density_under(
 def depth_under(
     force: float, *, radius: float, density: float, speed: float, stiffness: float
 ) -> float:
-    """How deep a resting load sinks, at most [m]; the stiffness must be greater than 0.
+    """Greatest depth of a resting load [m]; the stiffness must be greater than 0.
 
     Arguments are as for `density_under`.
     """
     spread = SPREAD * radius  # standard deviation of the footprint [m]
     ratio = 2 * speed**2 / (spread**2 * stiffness)
-    # share of the depth to which the load would sink on springs without tension
+    # depth over the depth on springs without tension
     share = math.log1p(ratio) / ratio if ratio > 0 else 1.0
     return share * force / (2 * math.pi * spread**2 * stiffness * density)
 
@@ -107,11 +106,11 @@ def depth_under(
 def density_after(
     impulse: float, depth: float, *, duration: float, radius: float, speed: float, stiffness: float
 ) -> float:
-    """Density with which a hit [N s] dents the surface by about a depth [m] at most [kg/m^2].
+    """Density at which a hit [N s] dents the surface at most by about a depth [m] [kg/m^2].
 
     The hit counts as a load impulse / T for a time T, its duration or, if that is longer, the time
-    that a wave takes across the footprint's standard deviation. In this time the surface's own
-    inertia holds it back as a stiffness of 1 / T^2 would.
+    of a wave across the footprint's standard deviation. In this time the inertia of the surface
+    acts like a stiffness of 1 / T^2.
     """
     crossing = SPREAD * radius / speed if speed > 0 else 0.0  # [s]
     time = max(duration, crossing)
@@ -122,7 +121,7 @@ def density_after(
 
 
 def density_for(impulse: float, depth: float, *, radius: float, speed: float) -> float:
-    """Density with which a short hit dents a surface without stiffness by a depth [kg/m^2].
+    """Density at which a short hit dents a surface without stiffness by a depth [kg/m^2].
 
     The dent of a Gaussian footprint is deepest after 1.31 s / c, with s its standard deviation:
     there it is 0.765 J / (2 pi sigma c s), where 0.765 is sqrt(2) times the maximum of Dawson's
@@ -161,7 +160,7 @@ def suited_coefficients(
 
 
 def _impulse_and_mass(hit: float | tuple[float, float]) -> tuple[float, float]:
-    """Impulse of a hit [N s], and the mass of the body that hits [kg]: 0 where it is not known."""
+    """Impulse of a hit [N s], and the mass of its body [kg], 0 if it is unknown."""
     if not isinstance(hit, tuple | list):
         require_positive(hit=(hit, "N s"))
         return hit, 0.0
@@ -180,5 +179,5 @@ def narrow_stiffness(size: float, speed: float) -> float:
 
 
 def damping_for(decay: float) -> float:
-    """Damping with which waves fall to a tenth in a time [s], in 1/s."""
+    """Damping at which waves fall to a tenth in a time [s], in 1/s."""
     return 2 * math.log(10) / decay

@@ -1,15 +1,15 @@
 """The finite elements of a texel mesh: the stiffness of its quads, triangles and polygons.
 
-A quad takes its gradient from its two diagonals (one-point integration), and has a little stiffness
-against the one pattern that the gradient does not see, the hourglass + - + - (Flanagan and
-Belytschko 1981). This pattern is a second derivative: its stiffness may be chosen, as long as
-linear functions have none of the pattern. In a quad that is no parallelogram they have some. Where
-the map onto the charts has kinks, eigenvalues then converge with order 1 to 1.6 instead of 2, so
-that the share of linear functions is taken out of the hourglass.
+The gradient of a quad comes from its two diagonals (one-point integration). The quad also has a
+little stiffness against the one pattern that this gradient does not see, the hourglass + - + -
+(Flanagan and Belytschko 1981). The pattern is a second derivative, so its stiffness may be chosen,
+provided that linear functions contain none of the pattern. In a quad that is no parallelogram they
+contain some. If this share stayed, eigenvalues would converge with order 1 to 1.6 instead of 2
+where the map onto the charts has kinks. So the share is subtracted from the hourglass.
 
-The stiffness decides whether short waves lag behind or run ahead, and follows from the quad's
-shape. Linear triangles give it far too much in a sheared quad: there waves ran ahead, by 3 % in the
-median over the elephant at N = 96.
+The hourglass stiffness follows from the quad's shape, and decides whether short waves are too slow
+or too fast. Linear triangles would make it far too large in a sheared quad: waves were 3 % too fast
+in the median over the elephant at N = 96.
 
 Vectors are three coordinates, of one point or of many. `shared` functions run in NumPy in double
 precision, where a surface is at rest, and in a kernel in single precision, where it moves;
@@ -29,7 +29,7 @@ from ..mesh.vectors import Vector, cross, dot, subtract
 
 Numbers: TypeAlias = Any  # a float, or an array of them
 
-# Numbers in single precision, which holds them exactly: they do not make single numbers double.
+# Numbers in single precision: products with single-precision numbers then stay in single precision.
 ZERO = np.float32(0)
 _QUARTER = np.float32(0.25)
 _HALF = np.float32(0.5)
@@ -38,30 +38,30 @@ _TWO = np.float32(2)
 _THREE = np.float32(3)
 _FOUR = np.float32(4)
 
-# One over the stiffness of a square against the hourglass, which is 0.4. At 1 waves lag along its
-# sides as much as they lead along its diagonals, 1/2 makes the 5-point stencil, 1/3 an isotropic
-# one, 1/4 allows the longest time step.
+# One over the hourglass stiffness of a square, which is 0.4. A stiffness of 1 makes waves as much
+# too slow along the sides as too fast along the diagonals, 1/2 gives the 5-point stencil, 1/3 an
+# isotropic stencil, and 1/4 the longest time step.
 PER_HOURGLASS = np.float32(2.5)
 
-# Elongated quads take up to this share of the hourglass stiffness that would begin to shorten their
-# own time step.
+# Elongated quads get up to this share of the hourglass stiffness at which their own time step would
+# begin to get shorter.
 SHARE = np.float32(0.75)
 
-# A quad counts as uneven where the middles of its diagonals are further apart than the root of one
-# over this, in units of the diagonals. In an even quad the hourglass share of linear functions is
-# of second order, and makes up for some of the lag of waves: on the sphere N = 64 is a third more
-# exact with it.
+# A quad counts as uneven if the distance between the middles of its diagonals is more than
+# 1 / sqrt(EVEN), in units of the diagonals. In an even quad the hourglass share of linear functions
+# is of second order, and compensates a part of the error of wave speeds: on the sphere the error at
+# N = 64 is a third smaller with it.
 EVEN = np.float32(1000)
 
-# Least area of a cell, in units of the area of a square of its size: a cell that is folded to a
-# line would need an infinitely short time step.
+# Least area of a cell, in units of the area of a square of its size: a cell folded to a line would
+# need an infinitely short time step.
 LEAST_AREA = np.float32(0.02)
 
 # Detours fade out in quads where |p|^2 |q|^2 - (p.q)^2 is below this share of |p|^2 |q|^2, with
 # diagonals p and q.
 FADED = np.float32(0.02)
 
-# Area of a cell in one point.
+# Area of a cell whose corners are one point.
 TINY_AREA = 1e-12
 TINY = np.float32(TINY_AREA)
 PER_TINY = np.float32(1 / TINY_AREA)
