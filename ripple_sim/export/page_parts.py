@@ -16,13 +16,17 @@ from ripple_sim.render.surfaces.vertices import memory_order
 from ripple_sim.render.visuals.scene_light import lighting_of
 from ripple_sim.render.visuals.studio import SOFT_BOX_LIGHTS
 from ripple_sim.render.visuals.texture_mapping import mapping_of
-from ripple_sim.render.visuals.visual import geom_visual, texture_pixels
+from ripple_sim.render.visuals.visual import geom_visual, texture_pixels_with_holes
 
 from .moving_mesh import MovingMesh
 from .source import Source
 from .visuals import Finish, Solid, mean_color, target_finish
 
 _MAX_IMAGE_SIZE = 1024  # of a texture, along a side [pixels]
+_JPEG_QUALITY = 88
+# Mean error of a JPEG, of 255, above which a texture comes without loss: images with small squares
+# of different colours, such as those of vertices.
+_MAX_JPEG_ERROR = 3.0
 
 
 class PagePart(NamedTuple):
@@ -153,9 +157,26 @@ def _part(
 
 def data_uri(model: mujoco.MjModel, texture: int) -> str:
     """A texture of the model as a picture within the page."""
-    image = Image.fromarray(texture_pixels(model, texture))
+    image = Image.fromarray(texture_pixels_with_holes(model, texture))
     image.thumbnail((_MAX_IMAGE_SIZE, _MAX_IMAGE_SIZE))
+    kind = "jpeg"
+    content = b"" if image.mode == "RGBA" else _encoded(image, kind)
+    if not content or _mean_error(content, image) > _MAX_JPEG_ERROR:
+        kind = "webp"
+        content = _encoded(image, kind)
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
+
+
+def _encoded(image: Image.Image, kind: str) -> bytes:
+    """An image as JPEG, or as WebP without loss."""
     file = io.BytesIO()
-    kind = "jpeg" if image.width > 64 else "png"
-    image.save(file, kind, quality=88)  # which JPEG alone has
-    return f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
+    options = {"quality": _JPEG_QUALITY} if kind == "jpeg" else {"lossless": True}
+    image.save(file, kind, **options)
+    return file.getvalue()
+
+
+def _mean_error(content: bytes, image: Image.Image) -> float:
+    """Mean difference of an encoded image from its pixels, of 255."""
+    with Image.open(io.BytesIO(content)) as decoded:
+        difference = np.asarray(decoded, np.int16) - np.asarray(image, np.int16)
+    return float(np.abs(difference).mean())

@@ -16,7 +16,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 from ripple_sim.encode.replace import png_mark
 from ripple_sim.render.visuals.lights import Lighting
 from ripple_sim.render.visuals.scene_light import lighting_of
-from ripple_sim.render.visuals.visual import texture_pixels
+from ripple_sim.render.visuals.visual import texture_has_holes, texture_pixels_with_holes
 
 from .source import Source
 from .visuals import Finish
@@ -24,6 +24,7 @@ from .visuals import Finish
 _MIN_LAMP_RADIUS = 0.01  # of a lamp whose MJCF gives no radius [m]
 _STUDIO_SKY = 0.25  # radiance of a sky in place of the studio's soft boxes, which USD does not have
 _COAT_ROUGHNESS = 0.1
+_HOLE_OPACITY = 0.5  # below which a texture with opacity has a hole
 _WATER = 1.33  # refractive index of transparent surfaces
 
 
@@ -216,7 +217,12 @@ class Materials:
                 color * look.emission
             )
         if finish.texture >= 0:
-            diffuse.ConnectToSource(self._image(path, finish.texture, color))
+            image = self._image(path, finish.texture, color)
+            diffuse.ConnectToSource(image.GetOutput("rgb"))
+            if texture_has_holes(self._model, finish.texture):
+                shader.GetInput("opacity").ConnectToSource(image.GetOutput("a"))
+                threshold = shader.CreateInput("opacityThreshold", Sdf.ValueTypeNames.Float)
+                threshold.Set(_HOLE_OPACITY)
         else:
             diffuse.Set(color)
         # what UsdPreviewSurface has no word for; Blender takes such attributes over as custom
@@ -231,8 +237,8 @@ class Materials:
         material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
         return material
 
-    def _image(self, path: Sdf.Path, texture: int, tint: Gf.Vec3f) -> UsdShade.Output:
-        """Node that reads an image, times a linear colour."""
+    def _image(self, path: Sdf.Path, texture: int, tint: Gf.Vec3f) -> UsdShade.Shader:
+        """Node that reads an image, times a linear colour, as "rgb", and its opacity, as "a"."""
         reader = UsdShade.Shader.Define(self._stage, path.AppendChild("st"))
         reader.CreateIdAttr("UsdPrimvarReader_float2")
         reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
@@ -241,7 +247,7 @@ class Materials:
         if texture not in self._textures:  # where it is, from the stage's file
             self._images.mkdir(exist_ok=True)
             name = f"texture_{texture}.png"
-            Image.fromarray(texture_pixels(self._model, texture)).save(
+            Image.fromarray(texture_pixels_with_holes(self._model, texture)).save(
                 self._images / name, pnginfo=png_mark()
             )
             self._textures[texture] = f"./{self._images.name}/{name}"
@@ -252,4 +258,6 @@ class Materials:
             image.CreateInput(side, Sdf.ValueTypeNames.Token).Set("repeat")
         st = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
         image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(st)
-        return image.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+        image.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+        image.CreateOutput("a", Sdf.ValueTypeNames.Float)
+        return image

@@ -16,7 +16,7 @@ from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearan
 from ripple_sim.render.surfaces.tessellation import BAKED, DIRECTION, NORMAL, POSITION
 from ripple_sim.render.surfaces.vertices import mapped_coordinates, surface_vertices
 from ripple_sim.render.visuals.objects import Assets, Occluders
-from ripple_sim.render.visuals.visual import Visual, target_visual
+from ripple_sim.render.visuals.visual import Visual, target_visual, texture_has_holes
 from ripple_sim.solver.errors import RippleError
 
 from .bounds import balls_about
@@ -146,7 +146,10 @@ class SurfaceMesh:
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
         colors = surface.heatmap_colors
         self._heatmap = None if colors is None else HeatmapTexture(resources, page, colors)
-        self._programs: dict[MappingKind, tuple[moderngl.Program, moderngl.VertexArray]] = {}
+        # by the kind of the texture, and whether it has holes
+        self._programs: dict[
+            tuple[MappingKind, bool], tuple[moderngl.Program, moderngl.VertexArray]
+        ] = {}
         is_lens = not self._is_open and look.transparency > 0.0
         self._casters = self._make_casters(is_lens)
         self._surface = surface
@@ -188,20 +191,25 @@ class SurfaceMesh:
             self._displacement.lay(mapped_coordinates(self._vertices.attributes, mapping))
         self._mapping = mapping
         self._image = None if mapping.texture < 0 else self._assets.texture(mapping.texture)
-        if mapping.kind not in self._programs:
-            self._programs[mapping.kind] = self._program_of(mapping.kind)
-        self._program, self._solid = self._programs[mapping.kind]
+        holes = mapping.texture >= 0 and texture_has_holes(self._assets.model, mapping.texture)
+        if (mapping.kind, holes) not in self._programs:
+            self._programs[mapping.kind, holes] = self._program_of(mapping.kind, holes)
+        self._program, self._solid = self._programs[mapping.kind, holes]
         if mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):
             self._program["tiling"] = mapping.tiling
 
-    def _program_of(self, kind: MappingKind) -> tuple[moderngl.Program, moderngl.VertexArray]:
-        """Program and vertex array for the G-buffer, for a kind of texture."""
+    def _program_of(
+        self, kind: MappingKind, holes: bool
+    ) -> tuple[moderngl.Program, moderngl.VertexArray]:
+        """Program and vertex array for the G-buffer, for a kind of texture, perhaps with holes."""
         resources = self._resources
         surface = self._surface
         displacement = self._displacement
         heatmap = int(self._heatmap is not None)
         grid = int(surface.grid > 0)
-        program = resources.program("surfaces/surface", MAPPING=kind, HEATMAP=heatmap, GRID=grid)
+        program = resources.program(
+            "surfaces/surface", MAPPING=kind, HEATMAP=heatmap, GRID=grid, HOLES=int(holes)
+        )
         program["resolution"] = float(self._page.resolution)
         if grid:
             program["grid_spacing"] = float(surface.grid)

@@ -1,5 +1,7 @@
 """The looks of a mesh file, packed into one texture of the model."""
 
+import base64
+import io
 from pathlib import Path
 
 import mujoco
@@ -8,11 +10,14 @@ import pytest
 from gltf_files import SQUARE, SQUARE_UV, Gltf, png
 from PIL import Image
 
+from ripple_sim.capture import FrameSource, snapshots
+from ripple_sim.export.page_parts import data_uri
 from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
 from ripple_sim.scene import drop_scene
 from ripple_sim.scene.material_images import MaterialImages, load_image
 from ripple_sim.scene.packing import packed
 from ripple_sim.scene.paint import paint_target
+from ripple_sim.simulation import Simulation
 from ripple_sim.solver import Mesh, load_mesh
 from ripple_sim.solver.mesh.looks import CLAMP, MIRROR, REPEAT, ImageSource, Looks, Paint
 
@@ -138,6 +143,57 @@ def test_a_mask_is_whole_or_open_and_its_texture_has_opacity(tmp_path: Path) -> 
     model, notes = painted(load_mesh(file.write(tmp_path / "a.glb")))
     assert (model.tex_nchannel[0], notes) == (4, ())
     assert sorted(set(model.tex_data[3::4].tolist())) == [0, 255]
+
+
+def half_clear(folder: Path) -> Path:
+    """A square that is red, and clear in its upper half."""
+    pixels = np.full((16, 16, 4), (*RED, 255), np.uint8)
+    pixels[:8, :, 3] = 0
+    file = Gltf()
+    material = file.add(
+        "materials",
+        alphaMode="MASK",
+        pbrMetallicRoughness={"baseColorTexture": {"index": file.texture(pixels)}},
+    )
+    file.show(file.primitive(TEXCOORD_0=file.accessor(SQUARE_UV), material=material))
+    return file.write(folder / "a.glb")
+
+
+def test_masks_have_holes_in_frames(opengl, tmp_path: Path) -> None:
+    def rows(path: Path) -> np.ndarray:
+        scene = drop_scene(path, bodies=0, up="y")
+        simulation = Simulation(scene, fps=10, resolution=16, backend="cpu")
+        source = FrameSource(simulation, width=96, height=72)
+        frame = source.render(next(iter(snapshots(simulation, 1)))).astype(int)
+        return np.nonzero(frame[..., 0] - frame[..., 2] > 60)[0]
+
+    clear = rows(half_clear(tmp_path))
+    (tmp_path / "a.glb").write_bytes((tmp_path / "a.glb").read_bytes().replace(b"MASK", b"SKIP"))
+    whole = rows(tmp_path / "a.glb")
+    assert len(clear) == pytest.approx(len(whole) / 2, rel=0.2)
+    assert np.quantile(clear, 0.05) > whole.min() + 10
+
+
+def test_pages_have_images_of_small_squares_without_loss_and_holes(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (128, 128, 3), np.uint8)
+    smooth = np.broadcast_to(np.arange(128, dtype=np.uint8)[:, None, None], (128, 128, 3))
+    kinds = []
+    for pixels in (noise, smooth, np.dstack([noise, noise[..., :1]])):
+        Image.fromarray(np.ascontiguousarray(pixels)).save(tmp_path / "a.png")
+        spec = mujoco.MjSpec()
+        height, width, channels = pixels.shape
+        two = mujoco.mjtTexture.mjTEXTURE_2D
+        texture = spec.add_texture(
+            name="t", type=two, height=height, width=width, nchannel=channels
+        )
+        texture.data = np.ascontiguousarray(pixels).tobytes()
+        head, _, data = data_uri(spec.compile(), 0).partition(",")
+        kinds.append(head)
+        if "webp" in head:
+            with Image.open(io.BytesIO(base64.b64decode(data))) as image:
+                opaque = pixels[..., -1] > 0 if channels == 4 else np.ones((128, 128), bool)
+                np.testing.assert_array_equal(np.asarray(image)[opaque], pixels[opaque])
+    assert kinds == [f"data:image/{kind};base64" for kind in ("webp", "jpeg", "webp")]
 
 
 def painted(mesh: Mesh, texture=None) -> tuple[mujoco.MjModel, tuple[str, ...]]:

@@ -29,7 +29,9 @@ out vec4 fragment;
 void main() {
   vec3 albedo = color;
 #ifdef TEXTURED
-  albedo *= linear(texture(image, uv).rgb);
+  vec4 texel = texture(image, uv);
+  if (texel.a < 0.5) discard;  // a hole
+  albedo *= linear(texel.rgb);
 #endif
   fragment = shownAt(point, gl_FrontFacing ? normal : -normal, albedo, height);
 }`;

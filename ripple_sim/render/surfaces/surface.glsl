@@ -1,6 +1,6 @@
 #version 410
 // A target into the G-buffer, with its texture; with HEATMAP one of the solver's fields in false colours, with GRID lines
-// between blocks of texels.
+// between blocks of texels, with HOLES holes where a flat texture is more than half transparent.
 uniform float resolution;  // texels along a chart's side
 
 VARYING vec3 normal;
@@ -72,6 +72,10 @@ float grid_ink(vec2 place, float resolution)
 
 void main()
 {
+#if HOLES && MAPPING == FLAT_IMAGE
+    if (texture(image, mapped.xy * tiling.xy + tiling.zw).a < 0.5)
+        discard;
+#endif
     vec3 shown = sqrt(textured(color.rgb, mapped, tiling));
     // a pixel whose centre lies beside the triangle must not leave its chart
     vec2 inside = clamp(place, chart + 1.0, chart + resolution + 1.0);

@@ -24,7 +24,7 @@ from ripple_sim.render.tone_mapping import srgb_to_linear
 from .scene_entries import outgrown_assets
 from .surroundings import horizon_of
 from .uploads import WrittenAssets
-from .visual import Look, texture_pixels
+from .visual import Look, texture_pixels, texture_pixels_with_holes
 
 _ROW = OBJECT.dtype
 
@@ -208,7 +208,8 @@ class Assets:
         if kind == "texture":
             self._mean_colors.pop(index, None)
             if index in self._uploaded:
-                write_srgb(self.resources, self._uploaded[index], texture_pixels(self.model, index))
+                pixels = texture_pixels_with_holes(self.model, index)
+                write_srgb(self.resources, self._uploaded[index], pixels)
             return
         self.reshaped.add((kind, index))
         for name in (f"{kind} {index}", f"hull {index}" if kind == "mesh" else ""):
@@ -218,7 +219,7 @@ class Assets:
     def texture(self, texture: int) -> moderngl.Texture | moderngl.TextureCube:
         """Return the texture of an id; it reads as linear light."""
         if texture not in self._uploaded:
-            pixels = texture_pixels(self.model, texture)
+            pixels = texture_pixels_with_holes(self.model, texture)
             flat = self.model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
             self._uploaded[texture] = (srgb_texture if flat else srgb_cube)(self.resources, pixels)
         return self._uploaded[texture]

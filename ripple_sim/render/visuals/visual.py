@@ -383,11 +383,29 @@ def look_of(model: Any, visual: Visual) -> Look:
 
 def texture_pixels(model: Any, texture: int) -> NDArray[np.uint8]:
     """Pixels of a model's texture, uint8 [height, width, 3], top row first."""
+    pixels = _stored_pixels(model, texture)
+    colors = np.repeat(pixels[..., :1], 3, axis=2) if pixels.shape[2] < 3 else pixels[..., :3]
+    return np.ascontiguousarray(colors, dtype=np.uint8)
+
+
+def texture_pixels_with_holes(model: Any, texture: int) -> NDArray[np.uint8]:
+    """Like `texture_pixels`, with opacity as a fourth channel where the texture has opacity."""
+    if not texture_has_holes(model, texture):
+        return texture_pixels(model, texture)
+    return np.ascontiguousarray(_stored_pixels(model, texture))
+
+
+def texture_has_holes(model: Any, texture: int) -> bool:
+    """Whether a model's texture is a flat one with opacity; a target has holes where it is low."""
+    is_flat = model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
+    return bool(is_flat and model.tex_nchannel[texture] == 4)
+
+
+def _stored_pixels(model: Any, texture: int) -> NDArray[np.uint8]:
+    """Pixels as the model stores them, [height, width, channels]."""
     height = int(model.tex_height[texture])
     width = int(model.tex_width[texture])
     channels = int(model.tex_nchannel[texture])
     start = int(model.tex_adr[texture])
     content = np.asarray(model.tex_data[start : start + height * width * channels])
-    pixels = content.reshape(height, width, channels)
-    colors = np.repeat(pixels[..., :1], 3, axis=2) if channels < 3 else pixels[..., :3]
-    return np.ascontiguousarray(colors, dtype=np.uint8)
+    return content.reshape(height, width, channels)

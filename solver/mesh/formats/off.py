@@ -20,7 +20,7 @@ from ..soup import Soup, too_small, triangulate
 from .text import decoded, numbers, three, whole
 
 # The first word of the file: what a vertex has besides its place.
-_HEADER = re.compile(r"(ST)?(C)?(N)?OFF")
+_HEADER = re.compile(r"(?P<pairs>ST)?(?P<colors>C)?(?P<normals>N)?OFF(?P<count>\d*)")
 
 # Numbers of a colour.
 _COLOR_SIZES = (3, 4)
@@ -86,8 +86,8 @@ def _opened(content: bytes) -> tuple[_Header, int, int, list[list[str]]]:
     match = _HEADER.fullmatch(rows[0][0].upper()) if rows else None
     if match is None or "BINARY" in [word.upper() for word in rows[0]]:
         raise MeshError("it does not start with OFF, as an OFF file in text form does")
-    # the counts may stand behind the word OFF, or on the next lines
-    rows[0] = rows[0][1:]
+    # the counts may stand behind the word OFF, even without a blank, or on the next lines
+    rows[0] = [word for word in (match["count"], *rows[0][1:]) if word]
     counts: list[str] = []
     while rows and len(counts) < 2:
         counts += rows.pop(0)
@@ -95,7 +95,7 @@ def _opened(content: bytes) -> tuple[_Header, int, int, list[list[str]]]:
         raise MeshError("the numbers of vertices and faces are missing after OFF")
     if len(counts) == 2 and rows and len(rows[0]) == 1:  # the number of edges, on its own line
         rows.pop(0)
-    header = _Header(*(group is not None for group in match.groups()))
+    header = _Header(*(match[name] is not None for name in _Header._fields))
     return header, int(counts[0]), int(counts[1]), rows
 
 

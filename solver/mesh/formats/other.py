@@ -109,11 +109,23 @@ def _by_assimp(path: Path) -> Soup:
         except subprocess.TimeoutExpired as error:
             raise MeshError(f"assimp did not finish within {_TIME_LIMIT} s") from error
         except subprocess.CalledProcessError as error:
-            said = error.stderr.decode(errors="replace").strip().splitlines()
-            reason = said[-1].partition(": ")[2][:200] if said else "it ended"
+            reason = _reason(error.stderr.decode(errors="replace"))
             raise MeshError(f"assimp cannot read it: {reason}") from error
         with np.load(target) as arrays:
             return _soup(path, dict(arrays))
+
+
+def _reason(said: str) -> str:
+    """Why assimp failed, of what the program wrote to stderr."""
+    lines = said.strip().splitlines()
+    if not lines:
+        return "it is damaged"
+    _, _, message = lines[-1].partition(": ")
+    if "triangulated faces" in message:
+        return "it holds points or lines"
+    if message.startswith("Assimp error loading"):  # and the path
+        message = message.partition("': ")[2]
+    return message.strip()[:200] or "it holds no mesh"
 
 
 def _soup(path: Path, arrays: dict[str, NDArray]) -> Soup:

@@ -285,9 +285,10 @@ def _looks(
         paint = np.clip(numbers, -1, len(names) - 1).astype(np.int64)[face]
         paints = (*paints, Paint())
         paint = np.where(paint < 0, len(names), paint)
-    if colors is None and not paints:
-        return None
-    return Looks(paints or (Paint(),), paint, colors)
+    if paints:
+        # beside an image, programs store colours that are not meant to tint it
+        return Looks(paints, paint)
+    return None if colors is None else Looks((Paint(),), paint, colors)
 
 
 def _corner_uv(

@@ -217,7 +217,7 @@ ROWS = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
     [
         "OFF # a comment\n# another\n4 2 0\n" + "\n".join(ROWS) + "\n3 0 1 2\n3 0\n2\n3\n",
         "OFF\n4\n2\n5\n" + "\n".join(ROWS) + "\n3 0 1 2 3 0 2 3\n",
-        "OFF 4 2 5\n" + " ".join(ROWS) + "\n3 0 1 2\n3 0 2 3\n",
+        "\t OFF4 2 5\n" + " ".join(ROWS) + "\n3 0 1 2\n3 0 2 3\n",
         "4 2 5".join(["NOFF\n", "\n"])
         + "\n".join(row + " 0 0 1" for row in ROWS)
         + "\n3 0 1 2\n3 0 2 3\n",
