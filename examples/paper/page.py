@@ -21,12 +21,17 @@ th:first-child, td:first-child { text-align: left }
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """One part of the paper: pictures are (file, caption); a table's first row is its head."""
+    """One part of the paper.
+
+    Pictures are (file, caption); a table's first row is its head; `live` names the scene of a live
+    page, which the built documentation shows.
+    """
 
     title: str
     text: str
     pictures: Sequence[tuple[Path, str]] = ()
     table: Sequence[Sequence[str]] = ()
+    live: str = ""
 
 
 def write_page(path: Path, title: str, lead: str, parts: Sequence[tuple[str, Part]]) -> None:
@@ -64,6 +69,8 @@ def write_markdown(path: Path, title: str, lead: str, parts: Sequence[tuple[str,
     pieces = [f"# {title}", lead]
     for command, part in parts:
         pieces += [f"## {part.title}", part.text]
+        if part.live:
+            pieces.append(f"<!-- player: {part.live} -->")
         for file, caption in part.pictures:
             picture = Image.open(file).convert("RGB")
             picture.thumbnail((1400, 1400))

@@ -15,7 +15,16 @@ from pathlib import Path
 from page import Part, write_markdown, write_page
 
 FOLDER = Path("out/paper")
-PARTS = ("figure_1", "figure_2", "figure_5", "figures_6_7", "figure_8", "section_6_4", "table_1")
+PARTS = (
+    "figure_1",
+    "figure_2",
+    "section_4_1",
+    "figure_5",
+    "figures_6_7",
+    "figure_8",
+    "section_6_4",
+    "table_1",
+)
 TITLE = "The paper, part by part"
 LEAD = (
     'The figures of Kira, Nakayama and Fujishiro, "Jacobian-free Deformation of Genus-0 Surfaces", '

@@ -174,14 +174,15 @@ function moveCamera(player, down, event) {
   player.redraw();
 }
 
-// Lets time pass while it plays.
+// Lets time pass while it plays and is in view.
 function clock(player, ui) {
-  let last = performance.now(), drawn = last, late = 1;
+  let last = performance.now(), drawn = last, late = 1, seen = true;
+  new IntersectionObserver(entries => { seen = entries.pop().isIntersecting; }).observe(player.canvas);
   const tick = async now => {
     const speed = Number(ui.of("speed").value) * player.meta.fps, count = player.frames.count;
     const elapsed = Math.min((now - last) / 1000, LONGEST_TICK) * Number(ui.of("speed").value);
     last = now;
-    if (player.playing) {
+    if (player.playing && seen) {
       ui.dragging(now);
       const next = player.number + elapsed * player.meta.fps, over = player.frames.ended && next >= count - (player.live ? 1 : 0);
       const due = player.live ? now - drawn > (player.drawing.software ? 900 / RATE : 0) : Math.floor(next) !== player.onCanvas;
