@@ -35,6 +35,7 @@ from . import arguments
 
 if TYPE_CHECKING:
     from ripple_sim.scene.scene import Scene
+    from ripple_sim.viewer.session import Session
     from ripple_sim.viewer.window import Window
 
 
@@ -369,12 +370,13 @@ class DropCommand(_VideoCommand):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ViewCommand:
-    """Open a scene or a mesh in an interactive window.
+    """Open a scene or a mesh in the browser, to poke it while it runs.
 
-    Click: poke the surface. Drag: orbit. Shift and drag: pan. Wheel: zoom. Space: pause or resume.
-    N: next frame. R: reset. T: throw a ball at the pointer. O: next operator (fem, uncorrected,
-    paper). C: heatmap on or off. S: screenshot. V: start or stop a recording. H: list of keys. Q:
-    quit. Sliders set the impulse of a poke and the material.
+    Click or drag on a surface: poke it. Drag a body: pull it. Drag beside them: orbit. Shift and
+    drag: pan. Wheel: zoom. Space: pause or resume. N: next frame. R: reset. T: throw a ball at the
+    pointer. O: next operator (fem, uncorrected, paper). C: colours by height. S: picture. V: start
+    or stop a recording. M: settings, with the material. Q: quit. Where there is no screen, the
+    address is printed.
     """
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
@@ -398,13 +400,14 @@ class ViewCommand:
     pieces."""
     folder: Annotated[Path, arg(metavar="FOLDER")] = Path()
     """Folder for screenshots and videos."""
+    window: bool = False
+    """Open a window of VTK's instead of a page in the browser."""
     web: bool = False
-    """Serve a web page for a browser instead of opening a window (needs the extra
-    ripple-sim[web])."""
+    """The page in the browser, which is the default now."""
     port: arguments.Count = 8080
-    """Port of the web page."""
+    """Port of the page."""
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
-    """Address of the web page. Any address but 127.0.0.1 lets other machines see and control the
+    """Address of the page. Any address but 127.0.0.1 lets other machines see and control the
     viewer."""
     benchmark: bool = False
     """Measure the update rate of the window, print it, and exit."""
@@ -414,7 +417,6 @@ class ViewCommand:
         from ripple_sim.encode.output import check_size
         from ripple_sim.scene.drop import is_scene
         from ripple_sim.viewer.opening import display_problem
-        from ripple_sim.viewer.window import benchmark, check_display, run
 
         # checks come before anything that takes time: first the arguments, then the machine
         is_scene(self.scene)
@@ -424,20 +426,25 @@ class ViewCommand:
                 f"there is no folder {str(self.folder)!r} for screenshots and videos; make it first"
             )
         if self.benchmark:
-            print(benchmark(self._window(off_screen=display_problem() is not None)))
-        elif self.web:
-            from ripple_sim.viewer.web import check_web, serve
+            from ripple_sim.viewer.window import benchmark
 
-            check_web(self.port, self.host)
-            serve(self._window(off_screen=True), self.port, self.host)
-        else:
+            print(benchmark(self._window(off_screen=display_problem() is not None)))
+        elif self.window:
+            from ripple_sim.viewer.window import check_display, run
+
             check_display()
             run(self._window(off_screen=False))
+        else:
+            from ripple_sim.viewer.access import check_port
+            from ripple_sim.viewer.page_server import show
+            from ripple_sim.viewer.page_view import view_of
 
-    def _window(self, off_screen: bool) -> Window:
+            check_port(self.port, self.host)
+            show(view_of(self._session(), self.folder, self.resolution), self.port, self.host)
+
+    def _session(self, fps: int = 60, has_skins: bool = False) -> Session:
         from ripple_sim.viewer.opening import open_scene
         from ripple_sim.viewer.session import Session
-        from ripple_sim.viewer.window import Window
 
         scene = open_scene(
             self.scene,
@@ -447,5 +454,10 @@ class ViewCommand:
             repair=self.repair,
             wrap=self.wrap,
         )
-        session = Session(scene, resolution=self.resolution)
+        return Session(scene, fps=fps, resolution=self.resolution, has_skins=has_skins)
+
+    def _window(self, off_screen: bool) -> Window:
+        from ripple_sim.viewer.window import Window
+
+        session = self._session(fps=30, has_skins=True)
         return Window(session, size=self.size, off_screen=off_screen, folder=self.folder)

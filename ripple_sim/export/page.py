@@ -1,220 +1,61 @@
-"""`PageWriter`: a run as one self-contained page, which lives in any browser and inside a notebook.
-
-The page solves the waves itself wherever it can, so that its surfaces can be poked: it has the law
-of each surface's waves (`wave_law`) and the recorded loads. What stays the same over time, meshes,
-looks, textures, camera and light, is written once. Triangles and vertices come in an order in which
-neighbours are close together: drawing then computes a vertex about once and not once for each of
-its triangles, and recorded heights are predicted well from earlier ones.
-"""
+"""`PageWriter`: a run as one self-contained page, which lives in any browser and in notebooks."""
 
 from __future__ import annotations
 
-import html
-import importlib.resources
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import mujoco
-import numpy as np
 
 from ripple_sim.coupling.ripples import Impulse
-from ripple_sim.coupling.soft import target_pose
-from ripple_sim.encode.replace import MARK, made_here
-from ripple_sim.overlay.color_map import color_table
-from ripple_sim.render.passes.floor import find_floor
+from ripple_sim.encode.replace import made_here
 
 from .page_coding import packed
-from .page_parts import PagePart, data_uri, floor_of, light_of, solid_part
-from .page_target import PageTarget
+from .page_content import PageContent, json_script
 from .source import Source, Writer
-from .visuals import solids
 
 __all__ = ["PageWriter", "made_here"]
 
-_SEGMENTS = 6  # of a primitive to a right angle
 _CHUNK = 16  # frames that are decoded together
-
-# The page's scripts, in the order in which they are joined.
-_SCRIPTS = (
-    "algebra.js",
-    "decode.js",
-    "motion.js",
-    "law.js",
-    "wave_loop.js",
-    "programs.js",
-    "wave_pass.js",
-    "texel_heights.js",
-    "surface.js",
-    "timeline.js",
-    "poke.js",
-    "light_shaders.js",
-    "shaders.js",
-    "environment.js",
-    "light.js",
-    "parts.js",
-    "groups.js",
-    "lit_points.js",
-    "floor.js",
-    "drawing.js",
-    "grid.js",
-    "player.js",
-    "controls.js",
-)
-_SHADERS = ("wave_step.frag",)
 
 
 class PageWriter(Writer):
-    """Writes a page of a run: the scripts, constant content, and chunks of frames.
-
-    A chunk is written when it is full.
-    """
+    """Writes the content of a page to a file; a chunk is written when it is full."""
 
     def __init__(self, source: Source, path: Path) -> None:
-        self._source = source
         self._file = path.open("w", encoding="utf-8")
-        self._targets = {name: PageTarget(source, name) for name in source.ripples}
-        self._with_motion: set[int] = set()  # targets whose mesh for motion is written
-        self._poses: list[list[list[float]]] = []
-        self._arrows: list[list[list[float]]] = []
+        self._content = PageContent(source)
         self._frames = 0
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add a frame."""
         if number == 0:
-            self._begin(data)
-        ripples = self._source.ripples
-        self._poses.append(self._places(data))
-        self._arrows.append([])
-        for hit in impulses:
-            _, rotation = target_pose(data, ripples.geom_ids[hit.geom])
-            normal = ripples[hit.geom].atlas.normals[hit.texel]
-            inwards = -rotation @ normal * (-1 if hit.inner else 1)
-            # point [m] and inward direction in the world, and impulse [N s]
-            arrow = (*hit.point, *inwards, hit.impulse)
-            self._arrows[-1].append([round(float(x), 5) for x in arrow])
-        for name, target in self._targets.items():
-            target.add(ripples.vertices(name, data))
+            for piece in self._content.begin(data, chunk=_CHUNK):
+                self._file.write(piece)
+        self._content.add(data, impulses)
         self._frames = number + 1
-        if len(self._poses) == _CHUNK:
+        if self._content.waiting == _CHUNK:
             self._flush()
 
     def finish(self) -> None:
         """Complete the page."""
-        self._flush()
-        pushes = [target.typical_push() for target in self._targets.values()]
-        self._write_json("end", {"frames": self._frames, "pushes": pushes})
+        if self._content.waiting:
+            self._flush()
+        pushes = [target.typical_push() for target in self._content.targets.values()]
+        self._file.write(json_script('id="end"', {"frames": self._frames, "pushes": pushes}))
         self._file.write("</body>\n</html>\n")
         self._file.close()
 
     def close(self) -> str:
         """Leave the file, complete or not, and end all recordings."""
-        for target in self._targets.values():
-            target.end()
+        self._content.end()
         return super().close()
 
-    def _places(self, data: mujoco.MjData) -> list[list[float]]:
-        """Position [m] and quaternion of the camera and of all bodies."""
-        pose = self._source.pose(data)
-        turn = np.zeros(4)
-        mujoco.mju_mat2Quat(turn, np.ascontiguousarray(pose.rotation).ravel())
-        places = np.vstack([[*pose.position, *turn], np.hstack([data.xpos, data.xquat])])
-        return np.round(places, 5).tolist()
-
-    def _begin(self, data: mujoco.MjData) -> None:
-        """Write everything that stays the same over time."""
-        folder = importlib.resources.files(__package__).joinpath("html")
-        page = folder.joinpath("page.html").read_text("utf-8")
-        title = html.escape(", ".join(self._targets))
-        self._file.write(page.replace("TITLE", title).replace("MARK", MARK))
-        for name in _SHADERS:
-            shader = folder.joinpath("shaders", name).read_text("utf-8")
-            self._file.write(f'<script type="x-shader" id="{name}">\n{shader}</script>\n')
-        parts = self._parts()
-        arrays = b"".join(array.tobytes() for part in parts for array in part.arrays)
-        self._write_json("meta", self._meta(parts, data))
-        self._file.write(f'<script type="text/plain" id="arrays">{packed(arrays)}</script>\n')
-        for number, target in enumerate(self._targets.values()):
-            law = target.begin()
-            if law:
-                attributes = f'class="law" data-target="{number}"'
-                self._file.write(f'<script type="application/json" {attributes}>{law}</script>\n')
-        scripts = [folder.joinpath(name).read_text("utf-8") for name in _SCRIPTS]
-        self._file.write('<script type="module">\n' + "\n".join(scripts) + "</script>\n")
-
-    def _parts(self) -> list[PagePart]:
-        """The meshes: targets first, then solid geoms other than the floor."""
-        targets = set(self._source.ripples.geom_ids.values())
-        floor = find_floor(self._source.model, targets)
-        left_out = targets if floor is None else targets | {floor}
-        parts = [target.part for target in self._targets.values()]
-        return parts + [
-            solid_part(solid) for solid in solids(self._source.model, left_out, _SEGMENTS)
-        ]
-
-    def _meta(self, parts: list[PagePart], data: mujoco.MjData) -> dict[str, Any]:
-        """The description of everything that stays the same over time."""
-        source = self._source
-        model = source.model
-        floor = find_floor(model, set(source.ripples.geom_ids.values()))
-        floor_meta = None if floor is None else floor_of(model, floor)
-        aspect = source.size[0] / source.size[1]
-        pose = source.pose(data).in_perspective(aspect, "the page")
-        textured = [part.meta for part in parts] + ([floor_meta] if floor_meta else [])
-        textures = {surface["texture"] for surface in textured if surface["texture"] >= 0}
-        return {
-            "fps": source.fps,
-            "slowMotion": source.slow_motion,
-            "chunk": _CHUNK,
-            "steps": [target.step for target in self._targets.values()],
-            "parts": [part.meta for part in parts],
-            "images": {texture: data_uri(model, texture) for texture in sorted(textures)},
-            "floor": floor_meta,
-            "light": light_of(source, data),
-            "fovy": pose.fovy,
-            "distance": pose.distance,
-            "aspect": aspect,
-            # of the heights, from the lowest to the highest, sRGB
-            "heat": color_table()[::8].tolist(),
-        }
-
     def _flush(self) -> None:
-        """Write the frames that wait as a chunk."""
-        if not self._poses:
-            return
-        middles: dict[int, list[list[float]]] = {}  # of the targets that move, by number
-        waves: dict[int, list[list[Any]]] = {}  # events of the targets that the page solves
-        heights: list[list[bytes]] = []  # of the others
-        moved: list[bytes] = []
-        for number, target in enumerate(self._targets.values()):
-            events, coded = target.flush()
-            if events is None:
-                heights.append(coded)
-            else:
-                waves[number] = events
-            places, coded_places = target.places()
-            if not target.moves:
-                continue
-            if number not in self._with_motion:  # before the chunk in which it first moves
-                attributes = f'class="motion" data-target="{number}"'
-                motion = json.dumps(target.motion())
-                self._file.write(
-                    f'<script type="application/json" {attributes}>{motion}</script>\n'
-                )
-                self._with_motion.add(number)
-            middles[number] = places
-            moved.append(coded_places)
-        content = {"poses": self._poses, "arrows": self._arrows, "middles": middles, "waves": waves}
-        text = json.dumps(content).encode()
-        by_frame = [plane for frame in zip(*heights, strict=True) for plane in frame]
-        planes = len(text).to_bytes(4, "little") + text + b"".join(by_frame + moved)
-        self._file.write(f'<script type="text/plain" class="chunk">{packed(planes)}</script>\n')
+        """Write the frames that wait as a chunk, after the meshes of what moves from now on."""
+        chunk = self._content.chunk()
+        for number, motion in chunk.motions.items():
+            self._file.write(json_script(f'class="motion" data-target="{number}"', motion))
+        frames = packed(chunk.content)
+        self._file.write(f'<script type="text/plain" class="chunk">{frames}</script>\n')
         self._file.flush()
-        self._poses = []
-        self._arrows = []
-
-    def _write_json(self, name: str, content: Any) -> None:
-        self._file.write(
-            f'<script type="application/json" id="{name}">{json.dumps(content)}</script>\n'
-        )

@@ -109,6 +109,14 @@ class PageTarget:
             pulse=self._pulse_of_the_material(),
         )
 
+    def renewed(self) -> str:
+        """The law of the waves from the latest frame on, if what was recorded has ended; or ""."""
+        if not (self.solves and self._tape.broken):
+            return ""
+        self._tape = Tape()
+        self._frames[-1] = self._frames[-1]._replace(events=[])
+        return self.begin()
+
     def end(self) -> None:
         """End the recording."""
         self._waves.forget(self._tape)

@@ -1,7 +1,6 @@
 from .controls import (
     CONTROLS as CONTROLS,
     MOUSE as MOUSE,
-    Recorder as Recorder,
     help_text as help_text,
     level as level,
 )
@@ -14,7 +13,10 @@ from .opening import (
     open_scene as open_scene,
     poke_strength as poke_strength,
 )
+from .page_server import PageServer as PageServer, served as served, show as show
+from .page_view import PageView as PageView, view_of as view_of
 from .passive import RippleViewer as RippleViewer, launch_passive as launch_passive
+from .recorder import Recorder as Recorder
 from .session import OPERATORS as OPERATORS, SLIDERS as SLIDERS, Session as Session
 from .stage import (
     BACKGROUND as BACKGROUND,
@@ -22,7 +24,6 @@ from .stage import (
     geom_mesh as geom_mesh,
     is_endless as is_endless,
 )
-from .web import check_web as check_web, serve as serve
 from .window import (
     Window as Window,
     benchmark as benchmark,

@@ -6,17 +6,11 @@ They are the same for the window, the web page and the help.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PIL import Image
-
-from ripple_sim.encode import FrameWriter, open_writer
-from ripple_sim.errors import VideoError
-from ripple_sim.solver.files import atomic_write
 
 from .session import SLIDERS, Session
 
@@ -92,93 +86,6 @@ def ray(renderer: pv.Renderer, x: int, y: int) -> tuple[NDArray[np.float64], NDA
         return point - ((point - eye) @ along) * along, along
     along = point - eye
     return eye, along / np.linalg.norm(along)
-
-
-class Recorder:
-    """Writes screenshots, and one video at a time, to a folder.
-
-    Files are called name-1.png, name-1.mp4 and so on.
-    """
-
-    def __init__(self, folder: Path, name: str, fps: int) -> None:
-        self.folder = folder
-        self._name = name
-        self._fps = fps
-        self._writer: FrameWriter | None = None
-
-    @property
-    def recording(self) -> bool:
-        """Whether a video is being written."""
-        return self._writer is not None
-
-    def save(self, frame: NDArray[np.uint8]) -> Path:
-        """Write a frame to an image, uint8 [height, width, 3], and return its path.
-
-        Raises `VideoError` if it cannot be written.
-        """
-        path = self._free(".png")
-        try:
-            with atomic_write(path) as unfinished:
-                Image.fromarray(frame).save(unfinished, format="PNG")
-        except OSError as error:
-            raise VideoError(f"cannot write {path}: {error.strerror or error}") from error
-        return path
-
-    def start(self, frame: NDArray[np.uint8]) -> Path:
-        """Begin a video of frames of this size; an odd row or column is left out. Return its path.
-
-        Raises `VideoError` if it cannot be written.
-        """
-        height, width, _ = _even(frame).shape
-        path = self._free(".mp4")
-        self._writer = open_writer(path, width=width, height=height, fps=self._fps)
-        self._shape = height, width, 3
-        return path
-
-    def add(self, frame: NDArray[np.uint8]) -> bool:
-        """Add a frame, or end the video if the window has changed its size.
-
-        Return whether the run continues.
-
-        Raises
-        ------
-        EncodingError
-            If it cannot be written; the video has then ended.
-        """
-        frame = _even(frame)
-        if self._writer is None or frame.shape != self._shape:
-            self.stop()
-            return False
-        try:
-            self._writer.write(frame)
-        except BaseException:
-            self._writer.discard()
-            self._writer = None
-            raise
-        return True
-
-    def stop(self) -> Path | None:
-        """End the video; return its path if one was being written."""
-        writer = self._writer
-        self._writer = None
-        if writer is None:
-            return None
-        if writer.frames:
-            writer.close()
-            return writer.path
-        writer.discard()
-        return None
-
-    def _free(self, ending: str) -> Path:
-        number = 1
-        while (path := self.folder / f"{self._name}-{number}{ending}").exists():
-            number += 1
-        return path
-
-
-def _even(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    height, width, _ = frame.shape
-    return np.ascontiguousarray(frame[: height - height % 2, : width - width % 2])
 
 
 def add_sliders(plotter: pv.Plotter, session: Session) -> list[Any]:

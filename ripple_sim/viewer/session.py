@@ -48,6 +48,8 @@ class Session:
         Frames a second of simulated time.
     resolution : int, optional
         Overrides the scene's atlas resolutions.
+    has_skins : bool
+        Whether `meshes` and `skins` are made, which a window draws.
 
     Attributes
     ----------
@@ -55,8 +57,8 @@ class Session:
         `MovingMesh` of each rippling geom, by name: triangles of about its texels.
     skins : dict
         Likewise, its points, normals and heights as of the latest frame, see `Displaced`.
-    poke_impulse : float
-        Of a poke [N s].
+    poke_radius, poke_impulse : float
+        Of a poke [m] and [N s].
     paused : bool
     operator : str
         The wave operator, one of `OPERATORS`.
@@ -66,7 +68,14 @@ class Session:
         Longest extent of the smallest rippling surface [m].
     """
 
-    def __init__(self, scene: Scene, *, fps: int = 30, resolution: int | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        fps: int = 30,
+        resolution: int | None = None,
+        has_skins: bool = True,
+    ) -> None:
         adopt_warnings()
         self.fps = fps
         self.simulation = Simulation(
@@ -82,14 +91,14 @@ class Session:
         limited = self.simulation.limited
         self.meshes = {
             name: MovingMesh(ripples[name].rest, limit=limited[name], triangles=MAX_TRIANGLES)
-            for name in ripples
+            for name in (ripples if has_skins else ())
         }
         self.skins: dict[str, Displaced] = {}
         # for rays, with their vertices
         self._scenes: dict[str, tuple[NDArray[np.float64] | None, RayScene]] = {}
         self.size = surface_size(scene)
         material = ripples[scene.targets[0].geom].material
-        self._poke_radius, self.poke_impulse = poke_strength(material, self.size)
+        self.poke_radius, self.poke_impulse = poke_strength(material, self.size)
         self.operator = OPERATORS[0]
         self.paused = False
         self.color_range = 0.0
@@ -207,7 +216,7 @@ class Session:
         if hit is None:
             return None
         name, point, _ = hit
-        self.simulation.ripples[name].add_impulse(point, self.poke_impulse, self._poke_radius)
+        self.simulation.ripples[name].add_impulse(point, self.poke_impulse, self.poke_radius)
         return point
 
     def throw(self, origin: ArrayLike, direction: ArrayLike) -> bool:

@@ -22,8 +22,9 @@ from ripple_sim.errors import DisplayError
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import is_software
 
-from .controls import CONTROLS, Recorder, add_sliders, help_text, level, ray
+from .controls import CONTROLS, add_sliders, help_text, level, ray
 from .opening import display_problem
+from .recorder import Recorder
 from .session import OPERATORS, Session
 from .stage import Stage
 

@@ -10,17 +10,23 @@ const LOG_RANGE = 2;  // a slider's ends multiply or divide by 4: two powers of 
 function control(player) {
   const of = id => document.getElementById(id);
   const ui = {of, follow: () => follow(player, of)};
-  ui.play = on => {
+  ui.show = on => {
     player.playing = on;
     player.redraw();
     of("play").className = on ? "playing" : "";
     of("play").setAttribute("aria-label", on ? "Pause" : "Play");
+  };
+  ui.play = on => {
+    ui.show(on);
+    player.following = true;
+    if (player.send) player.send(on ? "resume" : "pause");
   };
   of("hint").hidden = !player.live;
   buttons(player, ui);
   sliders(player, of);
   keys(player, ui);
   pointer(player, ui);
+  programControls(player, ui);
   window.onresize = () => player.redraw();
   player.canvas.addEventListener("webglcontextlost", event => { event.preventDefault(); player.lose(); });
   player.canvas.addEventListener("webglcontextrestored", () => player.regain());
@@ -30,6 +36,7 @@ function control(player) {
 
 function follow(player, of) {
   const slider = of("frame"), last = player.frames.count - 1, fps = player.meta.fps;
+  slider.min = player.frames.first || 0;
   slider.max = last;
   slider.value = player.number;
   slider.hidden = last < 1;
@@ -40,10 +47,16 @@ function buttons(player, ui) {
   const {of, play, follow} = ui;
   of("play").onclick = () => play(!player.playing);
   of("step").onclick = () => step(player, ui, 1);
-  of("restart").onclick = async () => { await player.restart(); play(true); follow(); };
+  of("restart").onclick = async () => {
+    if (player.send) player.send("reset");
+    else await player.restart();
+    play(true);
+    follow();
+  };
   let wanted = null;
   of("frame").oninput = async () => {  // only the latest place, however fast it is dragged
-    play(false);
+    if (player.playing) play(false);
+    player.following = false;
     const idle = wanted === null;
     wanted = Number(of("frame").value);
     while (idle && wanted !== null) {
@@ -65,6 +78,11 @@ function buttons(player, ui) {
 
 // One frame on or back; after the end, the time of one frame.
 async function step(player, ui, frames) {
+  if (player.send && frames > 0) {
+    player.send("step");
+    player.following = true;
+    return;
+  }
   ui.play(false);
   const atEnd = player.live && frames > 0 && player.number >= player.frames.count - 1;
   await (atEnd ? player.liveOn(1 / player.meta.fps) : player.show(Math.round(player.number) + frames));
@@ -85,9 +103,14 @@ function sliders(player, of) {
   player.strength = () => factor("impulse");
   of("waves").hidden = !player.live;
   const change = () => {
+    if (player.send) {
+      player.send("factors", {factors: {speed: factor("wave-speed"), damping: factor("damping"), stiffness: factor("stiffness")}});
+      return;
+    }
     for (const surface of player.surfaces) if (surface) surface.sliders = slidersOf(surface.law, factor("wave-speed"), Number(of("damping").value), factor("stiffness"));
   };
-  for (const id of ["wave-speed", "damping", "stiffness"]) of(id).oninput = change;
+  // the program makes new waves of it: once a slider stands
+  for (const id of ["wave-speed", "damping", "stiffness"]) of(id)[player.meta.stream ? "onchange" : "oninput"] = change;
   of("plain").onclick = () => { for (const id of ["impulse", "wave-speed", "damping", "stiffness"]) of(id).value = 0; change(); };
 }
 
@@ -101,9 +124,13 @@ function slidersOf(law, speed, damping, stiffness) {
 function keys(player, ui) {
   const {of} = ui, click = id => of(id).click();
   const actions = {
-    " ": () => click("play"), ".": () => step(player, ui, 1), ",": () => step(player, ui, -1), r: () => click("restart"), h: () => click("heat"),
-    c: () => click("contacts"), g: () => click("grid"), f: () => click("full"), p: () => click("picture"), "0": () => click("camera"), t: () => click("tune"),
+    " ": () => click("play"), n: () => step(player, ui, 1), b: () => step(player, ui, -1), r: () => click("restart"), c: () => click("heat"),
+    x: () => click("contacts"), g: () => click("grid"), f: () => click("full"), s: () => click("picture"), "0": () => click("camera"), m: () => click("tune"),
   };
+  if (player.meta.stream) {
+    const select = of("operator"), next = () => { select.selectedIndex = (select.selectedIndex + 1) % select.length; select.onchange(); };
+    Object.assign(actions, {t: () => click("throw"), o: next, v: () => click("record"), q: () => click("quit")});
+  }
   document.onkeydown = event => {
     const action = actions[event.key.toLowerCase()];
     const typing = event.target.matches("input[type=range], select") && event.key !== " ";
@@ -116,7 +143,7 @@ function keys(player, ui) {
 // On a surface the pointer pokes it, beside it and with other buttons or two fingers it moves the camera.
 function pointer(player, ui) {
   const canvas = player.canvas, down = new Map();
-  let dragged = null, latest = 0;
+  let dragged = null, latest = 0, held = null;
   const place = ({clientX, clientY}) => {
     const box = canvas.getBoundingClientRect();
     return [2 * (clientX - box.left) / box.width - 1, 1 - 2 * (clientY - box.top) / box.height];
@@ -135,11 +162,19 @@ function pointer(player, ui) {
     canvas.setPointerCapture(event.pointerId);
     down.set(event.pointerId, event);
     dragged = down.size === 1 && event.button === 0 && !event.shiftKey ? place(event) : null;
-    if (!press(1)) dragged = null;
+    if (press(1)) return;
+    held = dragged && player.send ? grabbed(player, ...dragged) : null;
+    dragged = null;
   };
-  canvas.onpointerup = canvas.onpointercancel = event => { down.delete(event.pointerId); dragged = null; };
+  canvas.onpointerup = canvas.onpointercancel = event => {
+    if (held) player.send("drop");
+    down.delete(event.pointerId);
+    dragged = held = null;
+  };
   canvas.onpointermove = event => {
-    if (dragged) dragged = place(event);
+    ui.place = place(event);
+    if (dragged) dragged = ui.place;
+    else if (held) pull(player, held, ...ui.place);
     else if (down.has(event.pointerId)) moveCamera(player, down, event);
     else canvas.style.cursor = player.frame && player.pick(...place(event)) ? "pointer" : "grab";
     if (down.has(event.pointerId)) down.set(event.pointerId, event);
@@ -182,7 +217,14 @@ function clock(player, ui) {
     const speed = Number(ui.of("speed").value) * player.meta.fps, count = player.frames.count;
     const elapsed = Math.min((now - last) / 1000, LONGEST_TICK) * Number(ui.of("speed").value);
     last = now;
-    if (player.playing && seen) {
+    if (player.send && seen) {
+      if (player.playing) ui.dragging(now);
+      if (player.following && player.newest > player.number && now - drawn > (player.drawing.software ? 900 / RATE : 0)) {
+        await player.show(player.newest);
+        drawn = now;
+        ui.follow();
+      }
+    } else if (player.playing && seen) {
       ui.dragging(now);
       const next = player.number + elapsed * player.meta.fps, over = player.frames.ended && next >= count - (player.live ? 1 : 0);
       const due = player.live ? now - drawn > (player.drawing.software ? 900 / RATE : 0) : Math.floor(next) !== player.onCanvas;

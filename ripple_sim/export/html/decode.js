@@ -1,7 +1,8 @@
 // Reading the page's own data: arrays of meshes, and chunks of frames.
 
-async function bytesOf(text) {
-  const raw = Uint8Array.from(atob(text), character => character.charCodeAt(0));
+async function bytesOf(text) { return inflated(Uint8Array.from(atob(text), character => character.charCodeAt(0))); }
+
+async function inflated(raw) {
   const stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
@@ -63,6 +64,8 @@ class Frames {
   }
 
   get tags() { return document.querySelectorAll("script.chunk"); }
+
+  async load() {}
 
   get ended() { return Boolean(document.getElementById("end")); }
 

@@ -2,6 +2,7 @@
 // shadow map: where software draws, its samples take most of the time.
 const INNER = 14, OUTER = 8, HALF = INNER + OUTER;  // cells from the middle to a side: of one size up to the camera's distance, and growing
 const MARGIN = 3, WIDER = 1.5;  // by which shadows may be wider [texels of the shadow map], and [radii of their penumbras]
+const FARTHEST = 20;  // of what casts shadows on the floor [distances of the camera]: balls wait far above to be thrown
 const ROWS = 24;  // of the picture, each of which the sky is drawn in or not
 
 class Floor {
@@ -90,7 +91,9 @@ class Floor {
         [...[0, 4, 8].map(k => dot(row, model.slice(k, k + 3))), dot(row, add(model.slice(12, 15), frame.slice(12, 15), -1)) - (middle[i] || 0)]);
       for (let k = 0; k < points.length; k++) {
         const point = points[k], x = places[3 * point], y = places[3 * point + 1], z = places[3 * point + 2];
-        const away = (az * x + bz * y + cz * z + dz) / rise, margin = (MARGIN * light.shadowTexel + far[k] + WIDER * light.lampSize * away) / rise;
+        const away = (az * x + bz * y + cz * z + dz) / rise;
+        if (away > FARTHEST * distance) continue;
+        const margin = (MARGIN * light.shadowTexel + far[k] + WIDER * light.lampSize * away) / rise;
         const u = ax * x + bx * y + cx * z + dx, v = ay * x + by * y + cy * z + dy, left = cell(u - margin), right = cell(u + margin);
         for (let i = cell(v - margin), high = cell(v + margin); i <= high; i++) for (let j = left; j <= right; j++) shadowed[i * side + j] = 1;
       }

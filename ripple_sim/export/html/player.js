@@ -27,10 +27,12 @@ class Player {
   async start() {
     readArrays(this.meta.parts, await bytesOf(document.getElementById("arrays").textContent));
     this.targets = this.meta.parts.filter(part => part.target);
-    this.frames = new Frames(this.meta, this.targets);
+    this.frames = this.meta.stream ? new StreamedFrames(this.meta, this.targets) : new Frames(this.meta, this.targets);
+    await this.frames.load();
+    Object.assign(this, {newest: 0, following: true});  // of frames that arrive: the latest, and whether it is shown
     this.drawing = new Drawing(this.canvas, this.meta);
     await this.drawing.load();
-    this.surfaces = await Promise.all(this.targets.map(surfaceOf));
+    this.surfaces = await Promise.all(this.targets.map((part, target) => surfaceOf(part, target)));
     this.chooseSolvers();
     this.timeline = new Timeline(this.frames, this.surfaces);
     const least = 1e-4 * this.meta.distance;
@@ -59,20 +61,28 @@ class Player {
   get live() { return this.surfaces.some(Boolean); }
 
   // Solves the waves as it is faster here, or by "loop" or "pass".
-  chooseSolvers(kind) {
+  chooseSolvers(kind) { this.surfaces.forEach(surface => surface && this.chooseSolver(surface, kind)); }
+
+  chooseSolver(surface, kind) {
     const {gl, software} = this.drawing;
-    for (const surface of this.surfaces) {
-      if (!surface) continue;
-      const loop = kind === "loop" || !kind && software || passFault(gl, surface.law);
-      const solver = loop ? new WaveLoop(surface.law) : kind ? new WavePass(surface.law, gl) : fasterSolver(surface.law, gl);
-      if (solver) surface.use(solver);
-    }
+    const loop = kind === "loop" || !kind && software || passFault(gl, surface.law);
+    const solver = loop ? new WaveLoop(surface.law) : kind ? new WavePass(surface.law, gl) : fasterSolver(surface.law, gl);
+    if (solver) surface.use(solver);
+  }
+
+  // Takes over the law of a surface whose material or state has changed.
+  async replaceSurface(target, meta) {
+    const before = this.surfaces[target], surface = await surfaceOf(this.targets[target], target, meta);
+    if (before) before.solver.free();
+    this.surfaces[target] = surface;
+    this.chooseSolver(surface, before ? before.solver.kind : undefined);
+    this.timeline.forgetAll();
   }
 
   // Draws a frame, or a moment between two, at once; returns when it is on the canvas.
   show(number) {
     this.work = this.work.then(async () => {
-      this.number = Math.max(0, Math.min(number, this.frames.count - 1));
+      this.number = Math.max(this.frames.first || 0, Math.min(number, this.frames.count - 1));
       await this.timeline.to(this.live ? this.number : Math.floor(this.number));
       await this.paint();
     });
@@ -182,27 +192,39 @@ class Player {
     this.orbit = {azimuth: Math.atan2(back[1], back[0]), elevation: Math.asin(Math.max(-1, Math.min(1, back[2]))), distance, focus};
   }
 
-  // The live surface at a place of the canvas, from -1 to 1 both, and the point in the frame of its geom; null beside them.
+  get aspect() { return this.canvas.clientWidth / this.canvas.clientHeight; }
+
+  // From the camera through a place of the canvas, from -1 to 1 both.
+  way(x, y) {
+    const {ray} = this.view(this.aspect);
+    return add(add(ray[0], ray[1], x), ray[2], y);
+  }
+
+  // The live surface at a place of the canvas, and the point in the frame of its geom; null beside them.
   pick(x, y) {
-    const {eye, ray} = this.view(this.canvas.clientWidth / this.canvas.clientHeight), bodies = this.bodies();
-    const way = add(add(ray[0], ray[1], x), ray[2], y), live = this.targets.filter((_, i) => this.surfaces[i] && !this.frame.steps[i]);
+    const {eye} = this.view(this.aspect), way = this.way(x, y), bodies = this.bodies();
+    const live = this.targets.filter((_, i) => this.surfaces[i] && !this.frame.steps[i]);
     const hit = touched(live, part => times(bodies[part.body], part.local), eye, way);
     return hit && {surface: this.surfaces[this.targets.indexOf(hit.part)], point: hit.point};
   }
 
-  // Presses a surface at a point with a multiple of its typical hit.
+  // Presses a surface at a point with a multiple of its typical hit. In the viewer the program does it.
   poke({surface, point}, strength) {
+    this.poked = true;
+    if (this.send) {
+      this.send("poke", {target: this.surfaces.indexOf(surface), point, strength});
+      return;
+    }
     surface.press(pressedTexels(surface.law, point), strength * surface.pulse);
     this.timeline.forget();
-    this.poked = true;
   }
 }
 
 // The surface of a target whose law the page has, or null.
-async function surfaceOf(part, target) {
+async function surfaceOf(part, target, changed) {
   const script = document.querySelector(`script.law[data-target="${target}"]`);
-  if (!script) return null;
-  const meta = JSON.parse(script.textContent), surface = new Surface(part, lawOf(meta, await bytesOf(meta.arrays)));
+  if (!script && !changed) return null;
+  const meta = changed || JSON.parse(script.textContent), surface = new Surface(part, lawOf(meta, await bytesOf(meta.arrays)));
   const end = document.getElementById("end"), push = end ? JSON.parse(end.textContent).pushes[target] : 0;
   surface.pulse = push || meta.pulse;
   return surface;

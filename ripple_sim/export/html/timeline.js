@@ -72,6 +72,7 @@ class Timeline {
 
   keep() {
     if (this.kept.some(({frame}) => frame === this.frame)) return;
+    this.kept = this.kept.filter(({frame}) => frame >= (this.frames.first || 0));
     this.kept.push({frame: this.frame, states: this.surfaces.map(surface => surface && surface.state)});
     if (this.kept.length > MOST_KEPT) this.kept = this.kept.filter((_, i) => i % 2 === 0);
   }
@@ -79,8 +80,14 @@ class Timeline {
   // After a poke, later states are no longer what will be.
   forget() { this.kept = this.kept.filter(({frame}) => frame <= this.frame); }
 
+  // Nothing before the present state can be gone back to.
+  forgetAll() {
+    this.kept = [];
+    this.keep();
+  }
+
   back(number) {
-    const {frame, states} = this.kept.filter(({frame}) => frame <= number).pop();
+    const {frame, states} = this.kept.filter(({frame}) => frame <= number).pop() || this.kept[0];
     this.every((surface, target) => surface.restore(states[target]));
     Object.assign(this, {frame, share: 0});
     this.cursors.forEach(cursor => Object.assign(cursor, {event: 0, substeps: 0, time: 0}));

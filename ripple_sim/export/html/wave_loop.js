@@ -1,6 +1,8 @@
 // The waves of a surface by a loop over its texels: as fast as a graphics card that is emulated, and for every browser.
 
 class WaveLoop {
+  get kind() { return "loop"; }
+
   constructor(law) {
     this.law = law;
     this.h = new Float32Array(law.count + 1);  // the last entry: a fixed rim, always 0

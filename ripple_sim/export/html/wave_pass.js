@@ -33,6 +33,8 @@ function layoutOf({count, begins}) {
 }
 
 class WavePass {
+  get kind() { return "pass"; }
+
   constructor(law, gl) {
     const {width, height, most} = layoutOf(law);
     Object.assign(this, {law, gl, width, height, most});

@@ -1,0 +1,63 @@
+// Controls of the viewer, beyond those of every page: they ask the program for what it does.
+const MESSAGE_TIME = 5000;  // for which a message is shown [ms]
+
+function programControls(player, ui) {
+  const {of} = ui, {stream} = player.meta;
+  let silence = 0;
+  ui.say = message => {
+    const hint = of("hint");
+    Object.assign(hint, {hidden: false, className: "", textContent: message});
+    clearTimeout(silence);
+    silence = setTimeout(() => { hint.className = "gone"; }, MESSAGE_TIME);
+  };
+  ui.paused = paused => ui.show(!paused);
+  if (!stream) return;
+  of("program").hidden = false;
+  of("clock").hidden = true;
+  for (const name of stream.operators) of("operator").add(new Option(name, name));
+  for (const name of stream.presets) of("preset").add(new Option(name, name));
+  of("operator").onchange = () => player.send("operator", {name: of("operator").value});
+  of("preset").onchange = () => player.send("preset", {name: of("preset").value});
+  of("throw").onclick = () => throwBall(player, ui);
+  of("record").onclick = () => player.send("record", {camera: cameraEntry(player)});
+  of("share").onclick = () => player.send("share");
+  of("copy").onclick = () => copyCamera(player, ui);
+  of("quit").onclick = () => player.send("quit");
+  connect(player, ui);
+  ui.paused(stream.paused);
+}
+
+// A ball from the camera at the pointer.
+function throwBall(player, ui) {
+  const [x, y] = ui.place || [0, 0], {eye} = player.view(player.aspect);
+  player.send("throw", {point: eye, way: player.way(x, y)});
+}
+
+// The view as `[camera]` of a scene file has it: the free camera of MuJoCo.
+function cameraEntry(player) {
+  const {back, focus, distance} = player.view(player.aspect), degrees = 180 / Math.PI;
+  return {lookat: focus, distance, azimuth: degrees * Math.atan2(-back[1], -back[0]), elevation: degrees * Math.asin(-back[2])};
+}
+
+function copyCamera(player, ui) {
+  const {lookat, distance, azimuth, elevation} = cameraEntry(player), list = lookat.map(x => x.toFixed(3)).join(", ");
+  const lines = ["[camera]", `lookat = [${list}]`, `distance = ${distance.toFixed(3)}`, `azimuth = ${azimuth.toFixed(1)}`,
+    `elevation = ${elevation.toFixed(1)}`, `fovy = ${player.meta.fovy.toFixed(1)}`];
+  navigator.clipboard.writeText(lines.join("\n") + "\n").then(() => ui.say("The camera is in the clipboard."), () => ui.say(lines.join("  ")));
+}
+
+// The body under a place of the canvas that can move, the point in its frame, and the plane on which it is dragged; or null.
+function grabbed(player, x, y) {
+  const bodies = player.bodies(), {eye, back} = player.view(player.aspect), way = player.way(x, y);
+  const hit = touched(player.meta.parts, part => times(bodies[part.body], part.local), eye, way);
+  if (!hit || hit.part.target || !player.meta.stream.movable.includes(hit.part.body)) return null;
+  const local = hit.part.local, place = [0, 1, 2].map(k => local[k] * hit.point[0] + local[4 + k] * hit.point[1] + local[8 + k] * hit.point[2] + local[12 + k]);
+  return {body: hit.part.body, point: place, plane: {normal: back, point: add(eye, way, hit.depth)}};
+}
+
+// Pulls a body to a place of the canvas.
+function pull(player, {body, point, plane}, x, y) {
+  const {eye} = player.view(player.aspect), way = player.way(x, y);
+  const depth = dot(add(plane.point, eye, -1), plane.normal) / dot(way, plane.normal);
+  player.send("drag", {body, point, way: add(eye, way, depth)});
+}

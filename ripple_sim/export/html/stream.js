@@ -1,0 +1,58 @@
+// A page of the viewer: MuJoCo runs in Python and sends frames as they happen; pokes, throws and all changes go back.
+const KEPT_FRAMES = 900;  // the time line goes back so far
+
+// Frames that arrive one after the other; the latest are kept.
+class StreamedFrames extends Frames {
+  constructor(meta, targets) {
+    super(meta, targets);
+    Object.assign(this, {list: new Map(), first: 0, received: 0});
+  }
+
+  get count() { return this.received; }
+
+  get ended() { return false; }
+
+  async load() { await this.push(await bytesOf(this.tags[0].textContent)); }
+
+  async get(number) { return this.list.get(Math.max(this.first, Math.min(number, this.received - 1))); }
+
+  // A chunk of one frame.
+  async push(bytes) {
+    const [frame] = await this.decoded(bytes);
+    this.list.set(this.received++, frame);
+    if (this.list.size > KEPT_FRAMES) this.list.delete(this.first++);
+  }
+}
+
+// Connects a player to the program that made its page. `ui` are its controls.
+function connect(player, ui) {
+  const {stream} = player.meta;
+  const socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/socket${location.search}&page=${stream.number}`);
+  socket.binaryType = "arraybuffer";
+  socket.onmessage = ({data}) => {
+    player.work = player.work.then(() => typeof data === "string" ? heard(player, ui, JSON.parse(data)) : arrived(player, data));
+  };
+  socket.onclose = () => { ui.say("The program has ended."); ui.paused(true); };
+  player.send = (command, rest = {}) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({do: command, ...rest})); };
+}
+
+async function arrived(player, data) {
+  await player.frames.push(await inflated(new Uint8Array(data)));
+  player.newest = player.frames.count - 1;
+}
+
+async function heard(player, ui, message) {
+  if (message.say) ui.say(message.say);
+  if ("paused" in message) ui.paused(message.paused);
+  if (message.reset) { player.timeline.forgetAll(); player.following = true; }
+  if (message.motion) {
+    const script = document.createElement("script");
+    Object.assign(script, {type: "application/json", className: "motion", textContent: JSON.stringify(message.motion.content)});
+    script.dataset.target = message.motion.target;
+    document.body.append(script);
+  }
+  if (message.law) {
+    await player.timeline.to(player.frames.count - 1);
+    await player.replaceSurface(message.law.target, JSON.parse(message.law.content));
+  }
+}
