@@ -15,6 +15,7 @@ from .opening import (
 )
 from .page_server import PageServer as PageServer, served as served, show as show
 from .page_view import PageView as PageView, view_of as view_of
+from .pages import Command as Command, Pages as Pages
 from .passive import RippleViewer as RippleViewer, launch_passive as launch_passive
 from .recorder import Recorder as Recorder
 from .session import OPERATORS as OPERATORS, SLIDERS as SLIDERS, Session as Session

@@ -1,4 +1,4 @@
-"""Serving a `PageView`: the page over HTTP, and its frames and commands over a websocket."""
+"""Serving `Pages`: the page over HTTP, and its frames and commands over a websocket."""
 
 from __future__ import annotations
 
@@ -26,17 +26,18 @@ from .access import (
 from .opening import display_problem
 from .page_stream import PageStream
 from .page_view import PageView
+from .pages import Pages
 
 _SOCKET = "/socket"
 _HTML = "text/html; charset=utf-8"
 
 
 class PageServer:
-    """Answers browsers for a view.
+    """Answers browsers.
 
     Parameters
     ----------
-    view : PageView
+    pages : Pages
     port : int
         0: a free one.
     host : str
@@ -48,8 +49,8 @@ class PageServer:
         What to open in a browser.
     """
 
-    def __init__(self, view: PageView, port: int, host: str) -> None:
-        self._view = view
+    def __init__(self, pages: Pages, port: int, host: str) -> None:
+        self._pages = pages
         self._host = host
         self._secret = new_secret()
         self._server: Server = listen(
@@ -81,7 +82,7 @@ class PageServer:
             return None
         if path != "/":
             return connection.respond(404, "there is only /\n")
-        response = connection.respond(200, self._view.open().text)
+        response = connection.respond(200, self._pages.open().text)
         del response.headers["Content-Type"]
         response.headers["Content-Type"] = _HTML
         for name, value in HEADERS.items():
@@ -91,7 +92,7 @@ class PageServer:
     def _stay(self, connection: ServerConnection) -> None:
         """Exchange messages with a page until it is closed."""
         number = query(connection.request.path, "page") if connection.request else ""
-        stream = self._view.stream(number)
+        stream = self._pages.connect(number)
         if stream is None:
             connection.close(4000, "open the page anew")
             return
@@ -99,11 +100,11 @@ class PageServer:
         sender.start()
         try:
             for message in connection:
-                self._view.tell(stream, message)
+                self._pages.ask(stream, message)
         except ConnectionClosed:
             pass
         finally:
-            self._view.leave(stream)
+            self._pages.leave(stream)
 
 
 def _send(connection: ServerConnection, stream: PageStream) -> None:
@@ -115,9 +116,9 @@ def _send(connection: ServerConnection, stream: PageStream) -> None:
 
 
 @contextlib.contextmanager
-def served(view: PageView, port: int, host: str) -> Iterator[PageServer]:
-    """Serve a view while the block runs."""
-    server = PageServer(view, port, host)
+def served(pages: Pages, port: int, host: str) -> Iterator[PageServer]:
+    """Serve pages while the block runs."""
+    server = PageServer(pages, port, host)
     server.start()
     try:
         yield server
@@ -130,7 +131,7 @@ def show(view: PageView, port: int, host: str) -> None:
     name = view.session.simulation.scene.name
     if not is_local(host):
         print(exposure(host, view.folder), file=sys.stderr)
-    with served(view, port, host) as server:
+    with served(view.pages, port, host) as server:
         print(f"{server.address} shows {name}; press Ctrl+C to stop", flush=True)
         if is_local(host) and display_problem() is None:
             webbrowser.open(server.address)

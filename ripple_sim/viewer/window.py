@@ -232,11 +232,6 @@ class Window:
         self.message = message
         self._show_status()
 
-    def hide_texts(self) -> None:
-        """Leave the status line and the list of keys out of the frame."""
-        for text in (self._text, self._help):
-            text.SetVisibility(False)
-
     def update(self) -> None:
         """Bring the stage up to date with the session."""
         self.stage.update()
@@ -400,6 +395,6 @@ def check_display() -> None:
     problem = display_problem()
     if problem:
         raise DisplayError(
-            f"no window can be opened: {problem}; add --web to use a browser instead, or render a "
-            "video with `ripple-sim render` or `ripple-sim drop`"
+            f"no window can be opened: {problem}; leave out --window to use a browser instead, or "
+            "render a video with `ripple-sim render` or `ripple-sim drop`"
         )

@@ -116,7 +116,7 @@ def test_a_device_that_is_not_there_is_a_failure_in_one_line(tmp_path, monkeypat
     "argv",
     [
         ["view", "missing"],
-        ["view", "missing.toml", "--web"],
+        ["view", "missing.toml"],
         ["export", "missing", "-o", "run.usdc"],
         ["render", "no such scene", "-o", "clip.mp4", "--renderer", "cycles"],
         ["drop", "missing.obj", "-o", "frames", "--frame-format", "exr"],
@@ -225,7 +225,7 @@ def test_help_loads_nothing_heavy():
         "import sys, ripple_sim\n"
         "from ripple_sim.cli.main import main\n"
         "main(['--help'])\n"
-        "heavy = {'vtkmodules', 'pyvista', 'trame', 'numba', 'mujoco', 'moderngl', 'av', 'scipy'}\n"
+        "heavy = {'vtkmodules', 'pyvista', 'numba', 'mujoco', 'moderngl', 'av', 'scipy'}\n"
         "print(sorted(heavy & set(sys.modules)))\n"
     )
     assert ended("-c", code, check=True).stdout.splitlines()[-1] == "[]"

@@ -90,6 +90,6 @@ def test_waves_need_nothing_of_posix_and_videos_no_viewer(tmp_path):
             del sys.modules[name]
         from ripple_sim.cli.main import main
         assert main({[*words, "--resolution", "8"]}) == 0
-        print(sorted({{"vtkmodules", "pyvista", "trame", "matplotlib"}} & set(sys.modules)))
+        print(sorted({{"vtkmodules", "pyvista", "matplotlib"}} & set(sys.modules)))
         """
     assert ended("-c", code, check=True).stdout.splitlines()[-1] == "[]"

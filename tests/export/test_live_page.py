@@ -253,12 +253,12 @@ def test_the_object_lives_on_after_the_end_and_keys_and_touch_reach_it(
         assert tab.evaluate("document.getElementById('hint').className") == "gone"
         tab.keyboard.press("Space")
         assert not tab.evaluate("ripplePlayer.player.playing")
-        tab.keyboard.press("h")
+        tab.keyboard.press("c")
         assert tab.evaluate("ripplePlayer.player.heat")
         tab.keyboard.press("g")
         assert tab.evaluate("ripplePlayer.player.grid")
         with tab.expect_download() as download:
-            tab.keyboard.press("p")
+            tab.keyboard.press("s")
         assert download.value.suggested_filename == "egg.png"
 
 

@@ -6,6 +6,7 @@ import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 from chromium import PATIENCE
@@ -15,11 +16,25 @@ SIZE = (320, 180)
 
 
 @contextlib.contextmanager
-def opened(browser: Any, page: Path, size: tuple[int, int] = SIZE, **options: Any) -> Iterator[Any]:
-    """A page in a browser. Errors, also those in the console, and requests fail the test."""
+def opened(
+    browser: Any,
+    page: Path | str,
+    size: tuple[int, int] = SIZE,
+    **options: Any,
+) -> Iterator[Any]:
+    """A page, a file or an address, in a browser.
+
+    Errors, also those in the console, and requests to elsewhere fail the test.
+    """
+    address = page if isinstance(page, str) else page.as_uri()
     tab = browser.new_page(viewport={"width": size[0], "height": size[1]}, **options)
     tab.set_default_timeout(1000 * PATIENCE)  # [ms]
     faults: list[str] = []
+
+    def is_foreign(url: str) -> bool:
+        own = isinstance(page, str) and urlsplit(url).netloc == urlsplit(page).netloc
+        return url.startswith("http") and not own
+
     tab.on("pageerror", lambda error: faults.append(str(error)))
     tab.on(
         "console",
@@ -27,9 +42,9 @@ def opened(browser: Any, page: Path, size: tuple[int, int] = SIZE, **options: An
     )
     tab.on(
         "request",
-        lambda request: faults.append(request.url) if request.url.startswith("http") else None,
+        lambda request: faults.append(request.url) if is_foreign(request.url) else None,
     )
-    tab.goto(page.as_uri())
+    tab.goto(address)
     yield tab
     assert faults == []
     tab.close()

@@ -1,7 +1,6 @@
 """The viewer's window in its own process, and `ripple-sim view`, with and without display."""
 
 import ctypes
-import importlib.util
 import os
 import re
 import socket
@@ -52,7 +51,9 @@ def test_without_a_display_the_alternatives_are_named(monkeypatch: pytest.Monkey
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setenv("DISPLAY", "")
     assert display_problem() == "the environment variable DISPLAY is not set"
-    with pytest.raises(DisplayError, match=r"DISPLAY is not set; add --web .*ripple-sim render"):
+    with pytest.raises(
+        DisplayError, match=r"DISPLAY is not set; leave out --window .*ripple-sim render"
+    ):
         check_display()
     monkeypatch.setattr("sys.platform", "darwin")
     check_display()
@@ -106,7 +107,7 @@ def test_a_missing_x11_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None
         (["sphere", "--resolution", "0"], "--resolution.*'0'"),
         (["sphere", "--bodies", "-1"], "--bodies"),
         (["sphere", "--port", "http"], "--port.*'http'"),
-        (["sphere", "--web", "--size", "0x0"], "must be 16 to 8192 .*, got 0x0"),
+        (["sphere", "--size", "0x0"], "must be 16 to 8192 .*, got 0x0"),
         (
             ["sphere", "--benchmark", "--size", "999999x999999"],
             "must be 16 to 8192 .*, got 999999x999999",
@@ -124,18 +125,10 @@ def test_an_invalid_mesh_is_bad_input(capsys: pytest.CaptureFixture[str], tmp_pa
     assert "flat.obj" in complaint(capsys, 2, str(tmp_path / "flat.obj"), "--benchmark")
 
 
-def test_without_trame_the_extra_is_named(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    assert "pip install 'ripple-sim[web]'" in complaint(capsys, 1, "sphere", "--web")
-
-
 def test_a_port_in_use_and_an_address_of_another_machine_are_named(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    pytest.importorskip("trame_vtk")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         for option, value in (("--port", str(taken.getsockname()[1])), ("--host", "192.0.2.1")):
-            line = complaint(capsys, 1, "sphere", "--web", option, value)
+            line = complaint(capsys, 1, "sphere", option, value)
             assert option in line and value in line

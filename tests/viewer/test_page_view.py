@@ -1,0 +1,184 @@
+"""The viewer's page in a headless browser: its waves are those of the program, and it drives it."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from chromium import PATIENCE, launched
+from pages import opened
+
+from ripple_sim.scene import Scene
+from ripple_sim.viewer import PageView, Session, served, view_of
+
+SIZE = (320, 180)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with launched("--use-angle=swiftshader", "--enable-unsafe-swiftshader") as made:
+        yield made
+
+
+@pytest.fixture
+def view(scene: Scene, tmp_path: Path) -> PageView:
+    return view_of(Session(scene, resolution=12, has_skins=False), tmp_path, 12)
+
+
+class Page:
+    """A page of a view, which runs only while the test waits for something."""
+
+    def __init__(self, tab: Any, view: PageView) -> None:
+        self.tab = tab
+        self.view = view
+
+    def wait_for(self, done: Callable[[], bool]) -> None:
+        end = time.monotonic() + PATIENCE
+        while not done():
+            assert time.monotonic() < end, "nothing happened"
+            self.view.tick()
+            self.tab.wait_for_timeout(1)
+
+    def wait_until(self, expression: str) -> None:
+        self.wait_for(lambda: self.tab.evaluate(expression))
+
+    def press(self, key: str) -> None:
+        self.tab.keyboard.press(key)
+
+    def run(self, seconds: float) -> None:
+        """Let the session run for a time, and the page come to its end."""
+        session = self.view.session
+        end = session.time + seconds
+        self.wait_for(lambda: session.time >= end)
+        session.paused = True
+        self.wait_until("""(async () => {
+            const player = ripplePlayer.player;
+            await player.work;
+            return player.number === player.frames.count - 1;
+        })()""")
+        self.wait_for(lambda: self.tab.evaluate("ripplePlayer.player.newest") >= self.frames - 1)
+
+    @property
+    def frames(self) -> int:
+        return self.tab.evaluate("ripplePlayer.player.frames.count")
+
+    def heights(self) -> np.ndarray:
+        """Of the texels, in the page."""
+        heights = self.tab.evaluate(
+            "ripplePlayer.player.work.then(() => "
+            "Array.from(ripplePlayer.player.surfaces[0].solver.read().h))"
+        )
+        return np.array(heights[:-1])
+
+    def agrees(self) -> bool:
+        """Whether the page's heights are the program's within 1 % of the highest."""
+        (name,) = self.view.session.simulation.ripples
+        height = self.view.session.simulation.ripples[name].height.ravel()
+        peak = np.abs(height).max()
+        return peak > 0 and np.abs(self.heights() - height).max() < 0.01 * peak
+
+
+@pytest.fixture
+def page(browser: Any, view: PageView) -> Iterator[Page]:
+    with (
+        served(view.pages, 0, "127.0.0.1") as server,
+        opened(browser, server.address, SIZE) as tab,
+    ):
+        tab.evaluate("ripplePlayer.ready")
+        page = Page(tab, view)
+        page.wait_until("ripplePlayer.player.newest > 2")
+        yield page
+        view.close()
+
+
+def test_pokes_and_balls_reach_the_program_and_waves_are_the_same_in_both(page: Page) -> None:
+    session = page.view.session
+    page.tab.mouse.click(150, 80)
+    page.wait_until("ripplePlayer.player.poked")
+    (name,) = session.simulation.ripples
+    page.wait_for(lambda: np.abs(session.simulation.ripples[name].height).max() > 1e-3)
+    page.press("t")
+    page.wait_for(lambda: len(session.parked) < 6)
+    page.run(0.3)
+    page.wait_for(page.agrees)
+
+
+def test_what_changes_the_waves_changes_them_in_the_page(page: Page) -> None:
+    """A reset, another operator and another material: the page gets the new law and the state."""
+    session = page.view.session
+    page.tab.mouse.click(150, 80)
+    page.run(0.1)
+    session.paused = False
+    page.press("o")
+    page.wait_for(lambda: session.operator == "uncorrected")
+    page.tab.evaluate("ripplePlayer.player.send('factors', {factors: {speed: 2, stiffness: 2}})")
+    (name,) = session.simulation.ripples
+    speed = np.max(session.simulation.ripples[name].material.speed)
+    page.wait_for(
+        lambda: np.max(session.simulation.ripples[name].material.speed) == pytest.approx(2 * speed)
+    )
+    page.run(0.2)
+    page.wait_for(page.agrees)
+    page.press("r")
+    page.wait_for(lambda: session.time < 0.1)
+    page.run(0.05)
+    page.wait_for(lambda: not np.abs(page.heights()).any())
+
+
+def test_pause_holds_the_time_and_a_step_is_one_frame(page: Page) -> None:
+    session = page.view.session
+    page.press(" ")
+    page.wait_for(lambda: session.paused)
+    held = session.time
+    page.press("n")
+    page.wait_for(lambda: session.time > held)
+    assert session.time == pytest.approx(held + 1 / session.fps)
+    page.wait_until("!ripplePlayer.player.playing")
+    page.press(" ")
+    page.wait_for(lambda: session.time > held + 0.1)
+
+
+def test_a_body_is_dragged_with_the_pointer(page: Page) -> None:
+    session = page.view.session
+    model = session.simulation.model
+    data = session.simulation.data
+    (ball,) = (
+        body
+        for body in page.tab.evaluate("ripplePlayer.player.meta.stream.movable")
+        if "thrown" not in model.body(body).name
+    )
+    page.press(" ")
+    page.wait_for(lambda: session.paused)
+    page.run(0.0)
+    x, y = page.tab.evaluate(
+        """body => {
+        const player = ripplePlayer.player, {matrix} = player.view(player.aspect);
+        const [x, y, z] = player.bodies()[body].slice(12, 15);
+        const row = k => matrix[k] * x + matrix[4 + k] * y + matrix[8 + k] * z + matrix[12 + k];
+        return [160 * (1 + row(0) / row(3)), 90 * (1 - row(1) / row(3))];
+    }""",
+        ball,
+    )
+    before = data.xpos[ball].copy()
+    page.tab.mouse.move(x, y)
+    page.tab.mouse.down()
+    page.tab.mouse.move(x + 60, y - 10, steps=4)
+    session.paused = False
+    page.wait_for(lambda: np.linalg.norm(data.xpos[ball] - before) > 0.1)
+    page.tab.mouse.up()
+    page.wait_for(lambda: not data.xfrc_applied.any())
+
+
+def test_pages_and_videos_are_written_to_the_folder(page: Page, opengl: None) -> None:
+    folder = page.view.folder
+    page.tab.evaluate("ripplePlayer.player.send('share')")
+    page.wait_for(lambda: (folder / "sphere-1.html").exists())
+    assert 'class="law"' in (folder / "sphere-1.html").read_text()
+    page.tab.evaluate("ripplePlayer.player.send('record')")
+    page.wait_until("document.getElementById('hint').textContent.startsWith('recording')")
+    page.tab.evaluate("ripplePlayer.player.send('record')")
+    page.wait_for(lambda: (folder / "sphere-1.mp4").exists())
+    page.press("q")
+    page.wait_for(lambda: page.view.closed)
