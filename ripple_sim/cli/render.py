@@ -372,11 +372,11 @@ class DropCommand(_VideoCommand):
 class ViewCommand:
     """Open a scene or a mesh in the browser, to poke it while it runs.
 
-    Click or drag on a surface: poke it. Drag a body: pull it. Drag beside them: orbit. Shift and
+    Click: poke the surface; drag on it: poke it on. Drag a body: pull it. Drag: orbit. Shift and
     drag: pan. Wheel: zoom. Space: pause or resume. N: next frame. R: reset. T: throw a ball at the
-    pointer. O: next operator (fem, uncorrected, paper). C: colours by height. S: picture. V: start
-    or stop a recording. M: settings, with the material. Q: quit. Where there is no screen, the
-    address is printed.
+    pointer. O: next operator (fem, uncorrected, paper). C: colours by height. S: screenshot. V:
+    start or stop a recording. M: settings, with the material. H: list of keys, with --window. Q:
+    quit. Where there is no screen, the address of the page is printed.
     """
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]

@@ -30,8 +30,8 @@ class PageWriter(Writer):
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add a frame."""
         if number == 0:
-            for piece in self._content.begin(data, chunk=_CHUNK):
-                self._file.write(piece)
+            for text in self._content.begin(data, chunk=_CHUNK):
+                self._file.write(text)
         self._content.add(data, impulses)
         self._frames = number + 1
         if self._content.waiting == _CHUNK:

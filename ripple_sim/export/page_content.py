@@ -100,7 +100,7 @@ class PageContent:
         return len(self._poses)
 
     def begin(self, data: mujoco.MjData, **settings: Any) -> Iterator[str]:
-        """Pieces of text of everything that stays the same; the recording begins with them.
+        """Texts of everything that stays the same, in order; the recording begins with them.
 
         `settings` are for the page's description.
         """

@@ -86,7 +86,7 @@ def test_the_help_lists_every_key_and_what_the_mouse_does(
 
 def test_a_display_without_a_server_is_named(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DISPLAY", ":4242")
-    assert "no X server at DISPLAY=:4242" in complaint(capsys, 1, "sphere")
+    assert "no X server at DISPLAY=:4242" in complaint(capsys, 1, "sphere", "--window")
 
 
 def test_a_missing_x11_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
