@@ -17,11 +17,18 @@ from ...kernel import Floats, Ints
 from .cells import BorderedCells, Metric, VoronoiCells, centred_cells, cut_borders, voronoi_cells
 from .surface import TriangleSurface
 
-# Rounds that mend cells.
+# Rounds that mend cells, at most.
 _MAX_MENDING_ROUNDS = 200
 
 # Least number of cells of a closed surface.
 _MIN_CELLS_CLOSED = 4
+
+# Least number of corners of a cell.
+_MIN_CORNERS = 3
+
+# Least length of a step along a path, over the longest step of the path, and in all [m].
+_MIN_STEP_SHARE = 1e-6
+_MIN_STEP = 1e-300
 
 # Bounds of the tangent of half an angle: beyond them triangles are so bad that round-off would fold
 # them.
@@ -44,12 +51,18 @@ def disk_cells(metric: Metric, cells: VoronoiCells) -> BorderedCells:
 
 
 def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, BorderedCells]:
+    """Cells that are disks with three corners, and the same with their borders cut.
+
+    They have more or other seeds than `cells`.
+    """
     surface = metric.surface
+    # seeds of cells that have already been given a neighbour for the sake of corners
     tried = set[int]()
     for _ in range(_MAX_MENDING_ROUNDS):
-        bad = np.flatnonzero(_euler(surface, cells) != 1)
-        if len(bad):
-            new = np.setdiff1d([_far_side(surface, cells, int(cell)) for cell in bad], cells.seeds)
+        no_disks = np.flatnonzero(_euler(surface, cells) != 1)
+        if len(no_disks):
+            far_sides = [_far_side(surface, cells, cell) for cell in no_disks.tolist()]
+            new = np.setdiff1d(far_sides, cells.seeds)
             if not len(new):
                 break
             cells = voronoi_cells(metric, np.concatenate([cells.seeds, new]))
@@ -58,10 +71,10 @@ def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, Bordered
             cells = voronoi_cells(metric, np.union1d(cells.seeds, np.argmax(cells.distance)))
             continue
         bordered = cut_borders(metric, cells)
-        few = np.flatnonzero([len(each) < 3 for each in bordered.arcs])
-        if not len(few):
+        few_corners = np.flatnonzero([len(arcs) < _MIN_CORNERS for arcs in bordered.arcs])
+        if not len(few_corners):
             return cells, bordered
-        cells = _with_corners(metric, cells, few, tried)
+        cells = _with_corners(metric, cells, few_corners, tried)
     raise AtlasError("no cells found that are disks with three corners")
 
 
@@ -95,10 +108,10 @@ def _euler(surface: TriangleSurface, cells: VoronoiCells) -> Ints:
     corners = label[surface.F]
     edges = ends[ends[:, 0] == ends[:, 1], 0]
     triangles = corners[(corners[:, 0] == corners[:, 1]) & (corners[:, 1] == corners[:, 2]), 0]
-    vertices, links, faces = (
-        np.bincount(each, minlength=count) for each in (label, edges, triangles)
-    )
-    return vertices - links + faces
+    vertex_count = np.bincount(label, minlength=count)
+    edge_count = np.bincount(edges, minlength=count)
+    triangle_count = np.bincount(triangles, minlength=count)
+    return vertex_count - edge_count + triangle_count
 
 
 def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
@@ -122,26 +135,34 @@ def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     inner = own[surface.F].all(axis=1)
     number = np.append(np.where(inner, np.cumsum(inner), 0), 0)  # 0: outside
     beside = number[edges.sides[links] // 3]  # -1 at a rim: the last
-    order = np.argsort(-loop, kind="stable")
-    order = order[~tree[order]]
-    # the last edge whose two triangles are joined already
-    root = list(range(int(inner.sum()) + 1))
+    longest_first = np.argsort(-loop, kind="stable")
+    order = longest_first[~tree[longest_first]]
+    closing = _last_closing(beside[order], int(inner.sum()) + 1)
+    if closing < 0:
+        return int(np.argmax(np.where(own, cells.distance, -1.0)))
+    closing_ends = ends[order[closing]]
+    return int(closing_ends[np.argmax(distance[closing_ends])])
+
+
+def _last_closing(pairs: Ints, count: int) -> int:
+    """The last pair [k, 2] of triangles that earlier pairs have joined already; -1 without one.
+
+    There are `count` triangles.
+    """
+    root = list(range(count))
     closing = -1
-    for e, (a, b) in zip(order.tolist(), beside[order].tolist(), strict=True):
+    for number, (a, b) in enumerate(pairs.tolist()):
         while root[a] != a:
             root[a] = a = root[root[a]]
         while root[b] != b:
             root[b] = b = root[root[b]]
         if a == b:
-            closing = e
+            closing = number
         root[a] = b
-    if closing < 0:
-        return int(np.argmax(np.where(own, cells.distance, -1.0)))
-    best = ends[closing]
-    return int(best[np.argmax(distance[best])])
+    return closing
 
 
-# of the vertices on the borders of parts: part and vertex, each [b], and place [b, 2]
+# The vertices on the borders of parts: part and vertex, each [b], and place [b, 2].
 Border = tuple[Ints, Ints, Floats]
 
 
@@ -159,13 +180,10 @@ def flattened(surface: TriangleSurface, part: Ints, border: Border) -> Floats:
     # mean-value weights: in corner k of a triangle, of its next vertex and of the one before
     triangles = surface.V[surface.F]
     sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
-    lengths = np.maximum(
-        np.stack([sides, np.roll(sides, 1, axis=1)], axis=2), np.finfo(np.float64).tiny
-    )
-    weights = (
-        np.clip(np.tan(surface.angles / 2), _MIN_HALF_TANGENT, _MAX_HALF_TANGENT)[:, :, None]
-        / lengths
-    )
+    to_neighbours = np.stack([sides, np.roll(sides, 1, axis=1)], axis=2)
+    lengths = np.maximum(to_neighbours, np.finfo(np.float64).tiny)
+    half_tangents = np.clip(np.tan(surface.angles / 2), _MIN_HALF_TANGENT, _MAX_HALF_TANGENT)
+    weights = half_tangents[:, :, None] / lengths
     places = _solved(corners, weights, start)[corners]
     folded = np.isin(part, part[signed_areas(places) <= 0])
     if folded.any():
@@ -182,16 +200,17 @@ def signed_areas(places: Floats) -> Floats:
 
 
 def along(V: Floats, paths: list[Ints]) -> Floats:
-    """How far along its path each vertex lies, from 0 to 1; the paths' one behind the other."""
-    sizes = np.array([len(each) for each in paths])
+    """How far along its path each vertex lies, from 0 to 1, one path after the other."""
+    sizes = np.array([len(path) for path in paths])
     inside = np.arange(sizes.max()) < sizes[:, None]
     # a row a path, so that sums do not depend on the paths before
     vertices = np.zeros(inside.shape, np.int64)
     vertices[inside] = np.concatenate(paths)
     x, y, z = np.moveaxis(np.diff(V[vertices], axis=1), 2, 0)
     steps = np.where(inside[:, 1:], np.sqrt(x * x + y * y + z * z), 0.0)
-    least = 1e-6 * steps.max(axis=1, initial=0.0) + 1e-300
-    lengths = np.cumsum(np.where(inside[:, 1:], np.maximum(steps, least[:, None]), 0.0), axis=1)
+    least = _MIN_STEP_SHARE * steps.max(axis=1, initial=0.0) + _MIN_STEP
+    widened = np.where(inside[:, 1:], np.maximum(steps, least[:, None]), 0.0)
+    lengths = np.cumsum(widened, axis=1)
     shares = np.concatenate([np.zeros((len(paths), 1)), lengths / lengths[:, -1:]], axis=1)
     return shares[inside]
 

@@ -77,19 +77,18 @@ def square(u: Any) -> Any:
 class SeamlessMap(NamedTuple):
     """Places of vertices on charts, and how triangles see them."""
 
-    F: Ints  # [m, 3]
-    frame: Ints  # [m], the chart whose frame is that of each triangle
-    chart: Ints  # [n], in which each vertex lies
-    z: Complex  # [n], its place there
-    freedom: Ints  # [n]
-    turn: Ints  # [m, 3], right angles from the vertex's frame to the triangle's
-    shift: Complex  # [m, 3], after that
-    glued: Ints  # [C, 4, 2]
-    # [C, 4], from the frame of each chart to that of the chart beyond each of its sides
-    side_turn: Ints
-    side_shift: Complex  # [C, 4], after that
-    star_start: Ints  # [n + 1], where the corners of each vertex begin
-    star: Ints  # [3 m], corners 3 triangle + k by vertex
+    F: Ints  # triangles, [m, 3]
+    frame: Ints  # the chart whose frame is that of each triangle, [m]
+    chart: Ints  # the chart in which each vertex lies, [n]
+    z: Complex  # the place of each vertex in its chart, [n]
+    freedom: Ints  # in which directions each vertex may move, [n]
+    turn: Ints  # right angles from the frame of each corner's vertex to the triangle's, [m, 3]
+    shift: Complex  # the shift after that turn, [m, 3]
+    glued: Ints  # the chart and its side beyond each side of every chart; -1: a rim, [C, 4, 2]
+    side_turn: Ints  # right angles from the frame of each chart to that beyond each side, [C, 4]
+    side_shift: Complex  # the shift after that turn, [C, 4]
+    star_start: Ints  # where the corners of each vertex begin, [n + 1]
+    star: Ints  # corners 3 triangle + k, by vertex, [3 m]
 
 
 def seamless_map(quads: Quads) -> SeamlessMap:
@@ -106,23 +105,20 @@ def seamless_map(quads: Quads) -> SeamlessMap:
     corners = CORNERS @ (1, 1j)
     side_turn = (there + 2 - here) % 4
     side_shift = corners[(there + 1) % 4] - _TURNS[side_turn] * corners[here]
-    chart = np.zeros(count, np.int64)
-    z = np.zeros(count, np.complex128)
-    freedom = np.full(count, FREE)
-    turn = np.zeros(F.shape, np.int64)
-    shift = np.zeros(F.shape, np.complex128)
+    star_start, star = stars(F, count)
     seamless = SeamlessMap(
-        F,
-        quads.chart,
-        chart,
-        z,
-        freedom,
-        turn,
-        shift,
-        quads.glued,
-        side_turn,
-        side_shift,
-        *stars(F, count),
+        F=F,
+        frame=quads.chart,
+        chart=np.zeros(count, np.int64),
+        z=np.zeros(count, np.complex128),
+        freedom=np.full(count, FREE),
+        turn=np.zeros(F.shape, np.int64),
+        shift=np.zeros(F.shape, np.complex128),
+        glued=quads.glued,
+        side_turn=side_turn,
+        side_shift=side_shift,
+        star_start=star_start,
+        star=star,
     )
     _connect(seamless, twin, quads.places[..., 0] + 1j * quads.places[..., 1])
     return seamless
@@ -166,9 +162,8 @@ def places_seen_from(seamless: SeamlessMap, triangles: Ints, corner: Ints) -> tu
 def places_on_charts(seamless: SeamlessMap) -> tuple[Ints, Ints, Complex]:
     """First corner of each triangle that is not a cone's tip, its chart, and all places there.
 
-    Such a corner knows in which chart it lies.
-
-    Returns these corners [m], charts [m], and the places [m, 3] of all corners there.
+    Such a corner lies in one chart. Returns these corners [m], charts [m], and the places [m, 3] of
+    all corners there.
     """
     free = seamless.freedom[seamless.F] != FIXED
     corner = np.where(free.any(axis=1), free.argmax(axis=1), 2)
