@@ -26,4 +26,5 @@ from .texels.topology import TexelTopology as TexelTopology
 from .waves.footprint import Footprint as Footprint
 from .waves.height_map import HeightMap as HeightMap
 from .waves.load import Load as Load
+from .waves.press import Imprint as Imprint
 from .waves.wave_solver import WaveSolver as WaveSolver

@@ -24,6 +24,7 @@ from .finite import FiniteGuard, as_field, check_kick, count_substeps, require_f
 from .footprint import Footprint, spread
 from .load import HeldLoad, Load, StepLoad, WaveState
 from .motion import Motion
+from .press import Imprint, Stamps
 from .sensor import Listeners, Sensor
 from .tape import RecordedBackend, Tape
 
@@ -134,6 +135,7 @@ class WaveSolver:
         self._balance = VolumeBalance(operator, conserve_volume)
         self._held = HeldLoad(self._backend, operator.source_share, self._balance)
         self._guard = FiniteGuard(atlas.positions)
+        self._stamps = Stamps()
         self.listeners = Listeners(self._backend)
         self._least_mass = float(operator.mass.min())
 
@@ -382,6 +384,53 @@ class WaveSolver:
         where, forces = spread(self.atlas, "force", force, "N", point, radius)
         self._held.add(Load(where.texels, forces))
         return where
+
+    def press(
+        self,
+        points: ArrayLike,
+        *,
+        forces: ArrayLike | None = None,
+        depths: ArrayLike | None = None,
+        radius: float = 0.0,
+    ) -> Imprint:
+        """Find how the surface lies at rest under what presses on it; the waves stay as they are.
+
+        Dents do not count. The first call factorises a matrix, and the first call with `depths`
+        solves for every point; calls with the same points and radius are much faster.
+
+        Parameters
+        ----------
+        points : [k, 3]
+            Where [m], in the frame of the mesh; the nearest surface points are taken.
+        forces : float or [k]
+            Forces at the points [N], positive inwards.
+        depths : float or [k]
+            How far a body reaches into the surface at the points [m], as MuJoCo's `tactile` sensor
+            tells; 0 and less where it does not. The forces follow: they press, and never pull.
+        radius : float
+            Radius of each point's footprint [m], along the surface; at least two texels are used.
+
+        Returns
+        -------
+        Imprint
+            Displacement, pressure, and the force at each point.
+
+        Raises
+        ------
+        SolverError
+            If nothing holds the surface: stiffness, a supported or clamped rim, or a volume that is
+            kept. If not exactly one of `forces` and `depths` is given, or they or the radius are
+            not finite.
+        AtlasError
+            If the points are not finite.
+        """
+        if (forces is None) == (depths is None):
+            raise SolverError("press takes either forces or depths, got both or neither")
+        stamp = self._stamps.stamp(self.atlas, self.operator, self.kept_parts, points, radius)
+        if depths is not None:
+            return stamp.press_to(depths)
+        assert forces is not None
+        return stamp.press(forces)
 
     def add_pressure(self, pressure: ArrayLike) -> None:
         """Add a pressure [Pa] that is held from now on: a number or [C, n, n], positive inwards."""
