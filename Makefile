@@ -2,6 +2,7 @@
 # make test   sets everything up, then runs the tests
 # make test-mujoco  runs the tests of the coupling with each version of MuJoCo that is supported
 # make check-bounds  runs the tests of the solver with every index in a kernel checked
+# make test-drivers  runs the tests of OpenGL on each driver that needs no GPU, and a validator over all shaders
 # make fuzz   10,000 strange inputs for each of the tests in tests/fuzz
 # make lint   ruff, mypy and the layers of packages
 # make docs   the documentation, into build/docs
@@ -15,7 +16,7 @@ ALL := .venv/.installed
 TYPES := build/types
 MUJOCOS := mujoco==3.16.0 mujoco==3.17.0 mujoco-core==4.0.1
 
-.PHONY: setup demo test test-mujoco check-bounds fuzz lint docs package sphere-maps types clean
+.PHONY: setup demo test test-mujoco check-bounds test-drivers fuzz lint docs package sphere-maps types clean
 
 # what running needs; the targets for which that is too little set up the rest
 setup: $(RUNNING)
@@ -52,6 +53,16 @@ check-bounds: $(ALL)
 	rm -rf build/bounds
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/build/bounds OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= \
 	    $(BIN)/python -m pytest -n 2 --dist worksteal tests/solver
+
+# what draws and what solves in OpenGL, on each driver that needs no GPU: Mesa's llvmpipe, the same as OpenGL 4.1, and zink
+# over Vulkan; every text of a shader also goes through Khronos's validator (packages mesa-vulkan-drivers, glslang-tools)
+DRIVEN := $(BIN)/python -m pytest -n 2 --dist worksteal -q tests/solver/backends tests/solver/gl tests/render
+test-drivers: $(ALL)
+	rm -rf build/shaders
+	PYTHONPATH=tests/support RIPPLE_SIM_SHADER_TEXTS=$(CURDIR)/build/shaders OPENBLAS_NUM_THREADS=1 $(DRIVEN) -p shader_texts
+	for text in build/shaders/*; do glslangValidator $$text || exit 1; done
+	MESA_GL_VERSION_OVERRIDE=4.1 MESA_GLSL_VERSION_OVERRIDE=410 OPENBLAS_NUM_THREADS=1 $(DRIVEN)
+	GALLIUM_DRIVER=zink LIBGL_ALWAYS_SOFTWARE=1 OPENBLAS_NUM_THREADS=1 $(DRIVEN)
 
 # much more of tests/fuzz, by chance; what it finds is kept in .hypothesis, and tried first the next time
 fuzz: $(ALL)
