@@ -18,6 +18,7 @@ from .simulation import Simulation as Simulation
 from .solver import Material as Material, RippleError as RippleError
 from .video.options import VideoOptions as VideoOptions
 from .video.render_video import render_video as render_video
+from .viewer.loop_view import view as view
 from .viewer.passive import launch_passive as launch_passive
 
 __version__: str

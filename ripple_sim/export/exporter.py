@@ -8,7 +8,7 @@ import html
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import mujoco
 
@@ -120,25 +120,17 @@ class Exporter:
         height_colors: float | Literal["auto"] | None = None,
         overwrite: bool = False,
     ) -> None:
-        model = own_model(model)
-        check_targets(model, ripples.model, ripples.geom_ids)
-        named = by_name(model, looks or {}, "looks")
         check_written(size, tessellation, triangles, chunk)
         check_mesh_format(mesh_format)
-        for look in named.values():
-            find_look(look)
-        paints = {
-            name: paint_of(model, geom, named.get(name)) for name, geom in ripples.geom_ids.items()
-        }
-        source = Source(
-            model=model,
-            ripples=ripples,
+        source = loop_source(
+            model,
+            ripples,
             fps=fps,
-            camera=camera_entry(model, camera),
-            size=size,
+            camera=camera,
+            looks=looks,
             lighting=lighting,
-            paints=paints,
-            limited=dict.fromkeys(ripples, limit),
+            size=size,
+            limit=limit,
             tessellation=tessellation,
             triangles=triangles,
             chunk=chunk or 0,
@@ -268,6 +260,38 @@ class Exporter:
             yield
         except OSError as error:
             raise EncodingError(f"cannot write {self.output}: {error.strerror or error}") from error
+
+
+def loop_source(
+    model: mujoco.MjModel,
+    ripples: Ripples,
+    *,
+    camera: str | CameraEntry | None,
+    looks: ByGeom[str] | None,
+    limit: bool = True,
+    **settings: Any,
+) -> Source:
+    """The source of a loop of one's own.
+
+    Parameters are as of `Exporter`; `settings` are fields of `Source`. Raises `RippleError` if the
+    ripples belong to another model, or an argument is invalid.
+    """
+    model = own_model(model)
+    check_targets(model, ripples.model, ripples.geom_ids)
+    named = by_name(model, looks or {}, "looks")
+    for look in named.values():
+        find_look(look)
+    paints = {
+        name: paint_of(model, geom, named.get(name)) for name, geom in ripples.geom_ids.items()
+    }
+    return Source(
+        model=model,
+        ripples=ripples,
+        camera=camera_entry(model, camera),
+        paints=paints,
+        limited=dict.fromkeys(ripples, limit),
+        **settings,
+    )
 
 
 def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> CameraEntry:

@@ -4,6 +4,7 @@ from .controls import (
     help_text as help_text,
     level as level,
 )
+from .loop_view import LoopView as LoopView, view as view
 from .opening import (
     BALLS as BALLS,
     FLIGHT as FLIGHT,

@@ -21,8 +21,6 @@ from ripple_sim.errors import DisplayError
 # [bytes]: largest message from the browser, which sends commands and places of the pointer
 LARGEST_MESSAGE = 64 * 1024
 
-HEADERS = {"Content-Security-Policy": "frame-ancestors 'none'", "Referrer-Policy": "no-referrer"}
-
 
 def new_secret() -> str:
     """128 random bits."""

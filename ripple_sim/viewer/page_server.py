@@ -14,7 +14,6 @@ from websockets.http11 import Request, Response
 from websockets.sync.server import Server, ServerConnection, serve as listen
 
 from .access import (
-    HEADERS,
     LARGEST_MESSAGE,
     address,
     exposure,
@@ -43,15 +42,19 @@ class PageServer:
     host : str
         Name or address to listen at; 127.0.0.1 is reached from this machine alone.
 
+    framed_by : str
+        Sites that may show the page within theirs, as in "Content-Security-Policy".
+
     Attributes
     ----------
     address : str
         What to open in a browser.
     """
 
-    def __init__(self, pages: Pages, port: int, host: str) -> None:
+    def __init__(self, pages: Pages, port: int, host: str, framed_by: str = "'none'") -> None:
         self._pages = pages
         self._host = host
+        self._framed_by = framed_by
         self._secret = new_secret()
         self._server: Server = listen(
             self._stay, host, port, process_request=self._answer, max_size=LARGEST_MESSAGE
@@ -85,8 +88,8 @@ class PageServer:
         response = connection.respond(200, self._pages.open().text)
         del response.headers["Content-Type"]
         response.headers["Content-Type"] = _HTML
-        for name, value in HEADERS.items():
-            response.headers[name] = value
+        response.headers["Content-Security-Policy"] = f"frame-ancestors {self._framed_by}"
+        response.headers["Referrer-Policy"] = "no-referrer"
         return response
 
     def _stay(self, connection: ServerConnection) -> None:

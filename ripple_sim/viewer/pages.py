@@ -100,9 +100,13 @@ class Pages:
     @property
     def ready(self) -> bool:
         """Whether a page is there, and none is behind."""
-        streams = [stream for stream, _ in self._streams.values()]
-        is_watched = any(stream.connected for stream in streams)
-        return is_watched and not any(stream.is_full for stream in streams)
+        is_watched = any(stream.connected for stream, _ in self._streams.values())
+        return is_watched and not self.is_behind
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether a page has not yet received what was sent."""
+        return any(stream.is_full for stream, _ in self._streams.values())
 
     def carry_out(self, actions: dict[str, Callable[[Command], None]]) -> None:
         """Carry out all messages; what is wrong with one is said to its page."""

@@ -5,11 +5,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from chromium import PATIENCE, launched
 from pages import opened
 
+import ripple_sim
+from ripple_sim import Material, Ripples
 from ripple_sim.scene import Scene
 from ripple_sim.viewer import PageView, Session, served, view_of
 
@@ -182,3 +185,29 @@ def test_pages_and_videos_are_written_to_the_folder(page: Page, opengl: None) ->
     page.wait_for(lambda: (folder / "sphere-1.mp4").exists())
     page.press("q")
     page.wait_for(lambda: page.view.closed)
+
+
+def test_a_loop_of_ones_own_is_shown_and_poked(browser: Any, scene: Scene) -> None:
+    model = scene.model
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {"sphere": Material(speed=0.5, density=200.0)}, resolution=10)
+    with (
+        ripple_sim.view(model, data, ripples, browser=False) as viewer,
+        opened(browser, viewer.address, SIZE) as tab,
+    ):
+        assert viewer.address in viewer._repr_html_()
+        tab.evaluate("ripplePlayer.ready")
+        tab.mouse.click(150, 80)
+        end = time.monotonic() + PATIENCE
+        while not np.abs(ripples["sphere"].height).max() > 1e-4:
+            assert time.monotonic() < end
+            ripples.mj_step(data, nstep=4)
+            viewer.sync()
+            tab.wait_for_timeout(1)
+        tab.wait_for_function(
+            "ripplePlayer.player.surfaces[0].solver.read().h.some(h => Math.abs(h) > 1e-5)"
+        )
+        tab.keyboard.press("q")
+        while viewer.is_running():
+            assert time.monotonic() < end
+            viewer.sync()
