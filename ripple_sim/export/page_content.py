@@ -59,7 +59,6 @@ _SCRIPTS = (
     "program.js",
     "controls.js",
 )
-_SHADERS = ("wave_step.frag",)
 
 
 class PageChunk(NamedTuple):
@@ -108,9 +107,9 @@ class PageContent:
         page = folder.joinpath("page.html").read_text("utf-8")
         title = html.escape(", ".join(self.targets))
         yield page.replace("TITLE", title).replace("MARK", MARK)
-        for name in _SHADERS:
-            shader = folder.joinpath("shaders", name).read_text("utf-8")
-            yield f'<script type="x-shader" id="{name}">\n{shader}</script>\n'
+        for shader in sorted(folder.joinpath("shaders").iterdir(), key=lambda file: file.name):
+            text = shader.read_text("utf-8")
+            yield f'<script type="x-shader" id="{shader.name}">\n{text}</script>\n'
         parts = self._parts()
         arrays = b"".join(array.tobytes() for part in parts for array in part.arrays)
         yield json_script('id="meta"', {**self._meta(parts, data), **settings})

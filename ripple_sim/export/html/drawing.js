@@ -46,7 +46,7 @@ class Drawing {
     this.floor = floor && new Floor(gl, floor, [floorVertex(light, onFloor), floorFragment(light, onFloor)], plain);
     this.sky = programOf(gl, EVERYWHERE_VERTEX, skyFragment(light));
     this.depth = programOf(gl, DEPTH_VERTEX, DEPTH_FRAGMENT);
-    this.shading = programOf(gl, DEPTH_VERTEX, shadeFragment(shadowSize));
+    this.shading = programOf(gl, DEPTH_VERTEX, SHADE_FRAGMENT, [`SIZE ${shadowSize}.0`]);
     this.smoothing = programOf(gl, EVERYWHERE_VERTEX, SMOOTH_FRAGMENT);
     this.triangles = programOf(gl, LIT_POINTS_VERTEX, LIT_POINTS_FRAGMENT);
     this.shaders = {surface: [SURFACE_VERTEX, surfaceFragment(light, lit)], points: [EVERYWHERE_VERTEX, pointsFragment(light, litShader({...told, taps: 4}))]};

@@ -1,12 +1,7 @@
 // The texels' grid as lines over a surface whose waves the page solves.
 const GRID_LIFT = 2e-3;  // of the lines off the surface [sizes of the object]
-const GRID_VERTEX = `
-layout(location = 0) in vec3 inPoint; layout(location = 1) in vec3 inNormal; layout(location = 2) in float inHeight;
-uniform mat4 modelProjection; uniform float lift;
-void main() { gl_Position = modelProjection * vec4(inPoint + (inHeight + lift) * inNormal, 1.0); }`;
-const GRID_FRAGMENT = `
-out vec4 fragment;
-void main() { fragment = vec4(0.0, 0.0, 0.0, 0.3); }`;
+const GRID_VERTEX = shaderOf("grid.vert");
+const GRID_FRAGMENT = shaderOf("grid.frag");
 
 class TexelGrid {
   constructor(gl, law) {

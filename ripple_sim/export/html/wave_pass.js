@@ -1,19 +1,7 @@
 // The waves of a surface by one fragment pass a substep, over a texture of heights and velocities (shaders/wave_step.frag).
 
-const LOAD_VERTEX = `
-layout(location = 0) in vec2 inLoad;  // texel and force
-uniform ivec2 size;
-out float force;
-void main() {
-  int texel = int(inLoad.x);
-  gl_Position = vec4((vec2(texel % size.x, texel / size.x) + 0.5) / vec2(size) * 2.0 - 1.0, 0.0, 1.0);
-  gl_PointSize = 1.0;
-  force = inLoad.y;
-}`;
-const LOAD_FRAGMENT = `
-in float force;
-out vec4 shown;
-void main() { shown = vec4(force, 0.0, 0.0, 1.0); }`;
+const LOAD_VERTEX = shaderOf("wave_load.vert");
+const LOAD_FRAGMENT = shaderOf("wave_load.frag");
 
 // Why WebGL cannot solve the waves of a surface, or "".
 function passFault(gl, law) {

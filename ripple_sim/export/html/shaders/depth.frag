@@ -1,0 +1,2 @@
+out vec2 blocker;
+void main() { blocker = vec2(1.0, gl_FragCoord.z); }

@@ -1,0 +1,3 @@
+in vec4 shown;
+out vec4 fragment;
+void main() { fragment = shown; }
