@@ -2,6 +2,7 @@
 
 import warnings
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,6 +17,7 @@ from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.scenes.shapes import limbed, peanut
 
 GEOM = mujoco.mjtGeom
+BALL_MASS = 0.2  # kg, of the bodies that `add_ball` adds
 ROUND = {
     "sphere": {"size": [0.05, 0, 0]},
     "capsule": {"type": GEOM.mjGEOM_CAPSULE, "size": [0.03, 0.05, 0]},
@@ -27,7 +29,7 @@ ROUND = {
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("body", ROUND)
-def test_bodies_in_any_pose_give_their_momentum_on_their_side(body: str, seed: int) -> None:
+def test_bodies_in_any_pose_give_their_momentum_to_the_side_they_hit(body: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     spec = mesh_spec(limbed(0.04), "free" if seed % 2 else None, condim=1)
     V, F = peanut(0.06)
@@ -36,29 +38,31 @@ def test_bodies_in_any_pose_give_their_momentum_on_their_side(body: str, seed: i
     spec.option.gravity = [0, 0, 0]
     add_ball(spec, "body", [0, 0, 9], condim=1, **ROUND[body])
     run = Run(spec, "target")
-    lost = 0.0
     data = run.data
-    joint = run.model.joint(run.model.body("body").jntadr[0])
     waves = run.ripples["target"]
     mujoco.mj_forward(run.model, data)
-    way = rng.standard_normal(3)
-    place = joint.qposadr[0]
-    start = joint.dofadr[0]
-    way /= np.linalg.norm(way)
-    data.qpos[place : place + 7] = [
-        *(data.geom("target").xpos + 0.6 * way),
+    joint = run.model.joint(run.model.body("body").jntadr[0])
+    first_position = joint.qposadr[0]
+    first_velocity = joint.dofadr[0]
+    velocity = slice(first_velocity, first_velocity + 3)
+    # thrown at the target from 0.6 m away, in any direction, pose and spin
+    direction = rng.standard_normal(3)
+    direction /= np.linalg.norm(direction)
+    data.qpos[first_position : first_position + 7] = [
+        *(data.geom("target").xpos + 0.6 * direction),
         *rng.standard_normal(4),
     ]
-    data.qvel[start : start + 6] = [*(-2 * way + rng.uniform(-0.1, 0.1, 3)), *rng.uniform(-3, 3, 3)]
+    data.qvel[velocity] = -2 * direction + rng.uniform(-0.1, 0.1, 3)
+    data.qvel[first_velocity + 3 : first_velocity + 6] = rng.uniform(-3, 3, 3)
+    lost = 0.0
     while data.time < 0.5:
-        before = data.qvel[start : start + 3].copy()
+        before = data.qvel[velocity].copy()
         hits = run.step()
-        change = 0.2 * (data.qvel[start : start + 3] - before)
+        change = BALL_MASS * (data.qvel[velocity] - before)
         lost += float(np.linalg.norm(change))
+        rotation = data.geom("target").xmat.reshape(3, 3)
         for hit in hits:
-            assert (
-                data.geom("target").xmat.reshape(3, 3) @ waves.atlas.normals[hit.texel] @ change > 0
-            )
+            assert rotation @ waves.atlas.normals[hit.texel] @ change > 0
     assert run.given() > 0.1
     assert run.given() == pytest.approx(lost, rel=0.03)
     assert -waves.momentum() == pytest.approx(run.given(), rel=0.03)
@@ -146,7 +150,7 @@ def test_a_rippling_geom_that_hits_a_flex_receives_the_momentum_it_loses(
         assert run.given(name) == pytest.approx(lost, rel=1e-3)
 
 
-def test_flex_written_by_hand_is_known_by_its_name() -> None:
+def test_a_flexcomp_with_the_targets_name_is_its_collider() -> None:
     V, F = peanut(0.05)
     spec = mujoco.MjSpec.from_string(
         f"""<mujoco><asset>{mesh_asset("shape", V, F)}</asset><worldbody>
@@ -158,7 +162,7 @@ def test_flex_written_by_hand_is_known_by_its_name() -> None:
     add_ball(spec, "ball", [-0.17, 0.01, 0.35])
     run = Run(spec, "target").until(0.25)
     assert run.pairs == {("target", "ball")}
-    lost = 0.2 * np.linalg.norm(
+    lost = BALL_MASS * np.linalg.norm(
         run.data.body("ball").cvel[3:] + np.array([0, 0, 9.81]) * run.data.time
     )
     assert run.given() == pytest.approx(lost, rel=0.03)
@@ -169,33 +173,46 @@ UP = (0.0, 0.0, 1.0)
 ASIDE = (1.0, 0.0, 0.0)
 
 
+class Slab(NamedTuple):
+    """A block, geom 0, that collides through a flex, and a ball; outward normals [triangles, 3]."""
+
+    model: mujoco.MjModel
+    normals: np.ndarray
+
+
 @pytest.fixture(scope="module")
-def slab() -> tuple[mujoco.MjModel, np.ndarray]:
-    """A block that collides through a flex (geom 0), a ball of 0.03 m, and outward normals."""
+def slab() -> Slab:
     solid = trimesh.creation.box(extents=(1, 1, 1))
     spec = mesh_spec((solid.vertices, solid.faces))
     add_ball(spec, "ball", [0, 0, 9], size=[0.03, 0, 0])
     model = spec.compile()
     corners = target_mesh(model, 0).V[target_mesh(model, 0).F]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return model, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return Slab(model, normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
-def summed(slab: tuple, contacts: list[tuple], surface: tuple[float, ...] | None = UP):
-    """Which contacts of the ball with the block are kept, and their forces and normals.
+class Loads(NamedTuple):
+    """Contacts that are kept [k], and the forces [N] and normals of the kept ones."""
+
+    kept: np.ndarray
+    forces: np.ndarray
+    normals: np.ndarray
+
+
+def loads_of(slab: Slab, contacts: list[tuple], surface: tuple[float, ...] | None = UP) -> Loads:
+    """The loads of some contacts of the ball with the block.
 
     A contact is an outward normal and the force on the ball [N]; the surface is the normal of the
     touched triangle, or None for a vertex.
     """
-    model, normals = slab
     k = len(contacts)
     x = np.array([normal / np.linalg.norm(normal) for normal, _ in contacts])
-    y = np.cross(x, [0.6, -0.7, 0.2])
+    y = np.cross(x, [0.6, -0.7, 0.2])  # any direction that no normal here has
     y /= np.linalg.norm(y, axis=1, keepdims=True)
     frames = np.stack([x, y, np.cross(x, y)], axis=1)
     elements = np.full((k, 2), -1, np.int32)
     if surface is not None:
-        elements[:, 0] = (normals @ surface).argmax()
+        elements[:, 0] = (slab.normals @ surface).argmax()
     contact = SimpleNamespace(
         dim=np.full(k, 3, np.int32),
         friction=np.ones((k, 5)),
@@ -208,24 +225,22 @@ def summed(slab: tuple, contacts: list[tuple], surface: tuple[float, ...] | None
     data = SimpleNamespace(contact=contact, geom_xmat=np.tile(np.eye(3).ravel(), (2, 1)))
     rows = np.arange(k), np.zeros(k, int), np.zeros(k, int), np.ones(k, int), np.zeros(1, int)
     along = np.einsum("kij,kj->ki", frames, [force for _, force in contacts])
-    kept, _, *loads = FlexContacts(CoupledModel(model), {0: target_mesh(model, 0)}).loads(
-        data, *rows, along
-    )
-    return kept, *loads
+    flex_contacts = FlexContacts(CoupledModel(slab.model), {0: target_mesh(slab.model, 0)})
+    kept, _, forces, normals = flex_contacts.loads(data, *rows, along)
+    return Loads(kept, forces, normals)
 
 
 RIM = [(UP, (0, 0, 3)), (ASIDE, (50, 0, 1)), ((-1, 0, 0), (-50, 0, 2))]
 
 
-def test_friction_of_contacts_that_push_sideways_counts_along_the_normal(slab: tuple) -> None:
+def test_friction_of_contacts_that_push_sideways_counts_along_the_normal(slab: Slab) -> None:
     """Opposite contacts at a rim cancel along x; their friction pushes upwards, 3 + 1 + 2 N."""
-    assert summed(slab, RIM, surface=None)[0].all(), (
-        "without the surface's normals all three would count as normals"
-    )
-    kept, forces, normals = summed(slab, RIM)
-    assert kept.tolist() == [True, False, False]
-    np.testing.assert_allclose(forces, [6])
-    np.testing.assert_allclose(normals, [UP], atol=1e-15)
+    # without the surface's normal all three contacts count with their own normals
+    assert loads_of(slab, RIM, surface=None).kept.all()
+    loads = loads_of(slab, RIM)
+    assert loads.kept.tolist() == [True, False, False]
+    np.testing.assert_allclose(loads.forces, [6])
+    np.testing.assert_allclose(loads.normals, [UP], atol=1e-15)
 
 
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
@@ -283,10 +298,11 @@ def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condi
         ([(ASIDE, (5, 0, 0))], 1.0),
     ],
 )
-def test_pushes_sideways_beyond_friction_are_warned_of(
-    slab: tuple, contacts: list, unexplained: float
+def test_warning_about_pushes_sideways_beyond_friction(
+    slab: Slab, contacts: list, unexplained: float
 ) -> None:
     with warnings.catch_warnings(record=True, action="always", category=RippleWarning) as caught:
-        summed(slab, contacts)
-    told = [f"wrong by about {unexplained:.1%}" in str(each.message) for each in caught]
-    assert told == ([True] if unexplained else [])
+        loads_of(slab, contacts)
+    messages = [str(warning.message) for warning in caught]
+    assert len(messages) == (1 if unexplained else 0)
+    assert all(f"wrong by about {unexplained:.1%}" in message for message in messages)

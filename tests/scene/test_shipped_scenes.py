@@ -1,7 +1,8 @@
-"""The shipped scenes: targets are hit, and ripples are seen and not absurd."""
+"""The shipped scenes: every target is hit, and its ripples are visible and not too high."""
 
 import importlib.resources
 import warnings
+from typing import NamedTuple
 
 import igl
 import mujoco
@@ -11,6 +12,7 @@ import pytest
 from ripple_sim import Simulation, load_scene
 from ripple_sim.scenes import shapes
 
+SCENES = importlib.resources.files("ripple_sim.scenes")
 NAMES = (
     "animal arm drum duck finger heavy jelly kick pair pretzel rolling skull sphere teapot terrain"
 )
@@ -52,7 +54,31 @@ def test_rolling_target_rolls_and_two_way_balls_hop() -> None:
     assert hop > 0.01
 
 
-SCENES = importlib.resources.files("ripple_sim.scenes")
+class FirstHit(NamedTuple):
+    """Time of a toy's first hit [s], and its speed before [m/s]."""
+
+    time: float
+    speed: float
+
+
+class Rain(NamedTuple):
+    """Five seconds of the duck.
+
+    Attributes
+    ----------
+    toys : list of int
+        Ids of the geoms that drop.
+    first_hits : dict
+        Of each toy that hits the duck.
+    inside : int
+        How often a toy's middle was inside the duck.
+    """
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    toys: list[int]
+    first_hits: dict[int, FirstHit]
+    inside: int
 
 
 def load(name):
@@ -73,42 +99,41 @@ def pressing(model, data, target):
 
 
 @pytest.fixture(scope="module")
-def duck_rain():
-    """Five seconds of the duck: time and speed of each toy's first hit; geoms inside."""
+def duck_rain() -> Rain:
     model, data = load("duck")
     V, F = shapes.duck()
     target = model.geom("duck").id
     toys = [g for g in range(model.ngeom) if model.geom(g).bodyid.item() > 0]
-    first = {}
+    first_hits: dict[int, FirstHit] = {}
     inside = 0
     for step in range(2500):
         velocity = data.qvel.reshape(-1, 6)[:, :3].copy()
         mujoco.mj_step(model, data)
         for geom in pressing(model, data, target):
             speed = np.linalg.norm(velocity[model.geom(geom).bodyid.item() - 1])
-            first.setdefault(geom, (data.time, speed))
+            first_hits.setdefault(geom, FirstHit(data.time, float(speed)))
         if step % 25 == 0:
             inside += int((igl.fast_winding_number(V, F, data.geom_xpos[toys]) > 0.5).sum())
-    return model, data, toys, first, inside
+    return Rain(model, data, toys, first_hits, inside)
 
 
 def test_every_toy_hits_the_duck_and_the_hits_are_spread_over_time(duck_rain):
-    model, _, toys, first, _ = duck_rain
-    assert len(toys) >= 10
-    assert {model.geom(g).name for g in toys} == {model.geom(g).name for g in first}
-    times = np.sort([time for time, _ in first.values()])
+    assert len(duck_rain.toys) >= 10
+    assert set(duck_rain.toys) == set(duck_rain.first_hits)
+    times = np.sort([hit.time for hit in duck_rain.first_hits.values()])
     assert times[0] < 0.4
     assert 3.0 < times[-1] < 3.6
     assert np.diff(times).max() < 0.5
 
 
 def test_no_toy_gets_into_the_duck_and_all_end_on_the_floor(duck_rain):
-    model, data, toys, _, inside = duck_rain
-    assert inside == 0
-    assert data.geom_xpos[toys, 2].max() < 0.15
-    assert np.abs(data.geom_xpos[toys, :2]).max() < 1.6
-    assert not any(warning.number for warning in data.warning)
-    assert len({int(model.geom_type[g]) for g in toys}) == 5
+    assert duck_rain.inside == 0
+    places = duck_rain.data.geom_xpos[duck_rain.toys]
+    assert places[:, 2].max() < 0.15
+    assert np.abs(places[:, :2]).max() < 1.6
+    assert not any(warning.number for warning in duck_rain.data.warning)
+    kinds = {int(duck_rain.model.geom_type[toy]) for toy in duck_rain.toys}
+    assert len(kinds) == 5
 
 
 def test_duck_stands_where_its_mesh_file_says():
