@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from fuzzing import EXAMPLES, home_of_others
@@ -17,7 +18,8 @@ from small_batch import PLAN, write_files
 from unfinished_videos import contents
 
 SMALL = "--fps 40 --duration 0.2 --size 32x32 --backend cpu"
-JOBS = {  # the first of them in the tests, all by `make fuzz`
+# the tests run the first of them, `make fuzz` runs all
+JOBS = {
     "frames": f"render scene.toml -o out/frames --passes depth,flow {SMALL} --resume",
     "batch": "batch plan.toml -o out --keep-free 0.01",
     "chunks": f"export scene.toml -o out/run.usda --chunk 2 {SMALL} --resume",
@@ -27,7 +29,7 @@ JOBS = {  # the first of them in the tests, all by `make fuzz`
     "zarr": f"export scene.toml -o out/run.zarr {SMALL}",
     "page": f"export scene.toml -o out/run.html {SMALL}",
 }
-# a process is forked from one that has imported all, so that most moments lie in the work
+# processes are forked from a server that has imported everything, so that most kills hit the work
 CONTEXT = multiprocessing.get_context("forkserver")
 LOADED = [
     "batch.worker",
@@ -60,7 +62,7 @@ def finish(home: Path, words: str, kill: int = 0, after: float = 300) -> tuple[i
 
 
 def made(folder: Path) -> dict[str, bytes]:
-    """All that a job makes but for the times in it, and where it was."""
+    """The files of a job, without times and without the path of its folder."""
     timed = ("times.json", "index.parquet", "index.html")
     return {
         name: content.replace(str(folder.parent).encode(), b"home")
@@ -79,33 +81,42 @@ def write_inputs(home: Path) -> None:
     )
 
 
-Whole = Callable[[str], tuple[float, dict[str, bytes]]]
+class UnbrokenJob(NamedTuple):
+    """A job that was not killed: how long it took [s], and its files."""
+
+    seconds: float
+    files: dict[str, bytes]
+
+
+UnbrokenJobs = Callable[[str], UnbrokenJob]
 
 
 @pytest.fixture(scope="module")
-def undisturbed(opengl: None) -> Iterator[Whole]:
-    """How long a job takes by its name [s], and what it makes; found out when it is asked for."""
+def unbroken(opengl: None) -> Iterator[UnbrokenJobs]:
+    """Unbroken jobs by name; each runs when it is asked for."""
     CONTEXT.set_forkserver_preload([*(f"ripple_sim.{each}" for each in LOADED), "pandas"])
     with tempfile.TemporaryDirectory() as folder:
 
         @functools.cache
-        def whole(name: str) -> tuple[float, dict[str, bytes]]:
+        def run(name: str) -> UnbrokenJob:
             home = Path(folder) / name
             home.mkdir()
             write_inputs(home)
             status, seconds = finish(home, JOBS[name])
             assert status == 0
-            return seconds, made(home / "out")
+            return UnbrokenJob(seconds, made(home / "out"))
 
-        yield whole
+        yield run
 
 
 @pytest.mark.parametrize("seed", range(EXAMPLES // 50 or 4))
-def test_a_job_that_is_killed_and_run_again(undisturbed: Whole, seed: int) -> None:
+def test_a_killed_job_that_runs_again_makes_the_same_files(
+    unbroken: UnbrokenJobs, seed: int
+) -> None:
     chance = random.Random(seed)
     name = list(JOBS)[seed % len(JOBS)]
     kills = chance.choices([signal.SIGKILL, signal.SIGTERM, signal.SIGINT], k=chance.choice([1, 2]))
-    seconds, expected = undisturbed(name)
+    seconds, expected = unbroken(name)
     with home_of_others() as home:
         write_inputs(home)
         for kill in kills:

@@ -59,9 +59,7 @@ def velocity(data: mujoco.MjData, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("entry", [DropEntry, ThrowEntry])
-def test_velocity_and_spin_are_those_of_the_world_whatever_the_orientation(
-    model, entry: type
-) -> None:
+def test_velocity_and_spin_are_in_the_world_frame(model, entry: type) -> None:
     turn = (0.5, -1.5, 2.0, 1.0)
     motion = {"velocity": (4, 5, 6), "angular_velocity": (-1, 2, 3)}
     data = applied(model, entry("stone", 0.0, position=(1, 2, 3), orientation=turn, **motion))
@@ -71,14 +69,14 @@ def test_velocity_and_spin_are_those_of_the_world_whatever_the_orientation(
     assert not velocity(data, "brick").any()
 
 
-def test_without_place_and_orientation_a_throw_begins_where_the_body_is(model) -> None:
+def test_a_throw_without_place_and_orientation_begins_at_the_bodys_pose(model) -> None:
     data = applied(model, ThrowEntry("stone", 0.0, velocity=(1, 0, 0), angular_velocity=(0, 0, 7)))
     np.testing.assert_allclose(velocity(data, "stone"), [0, 0, 7, 1, 0, 0], atol=1e-12)
     np.testing.assert_allclose(data.body("stone").xpos, [0, 0, 3])
     np.testing.assert_allclose(data.body("stone").xquat, [0.6, 0, 0.8, 0])
 
 
-def test_a_placed_body_is_at_rest_and_only_it_is_touched(model) -> None:
+def test_a_placed_body_is_at_rest_and_other_bodies_are_unchanged(model) -> None:
     data = mujoco.MjData(model)
     data.qvel[:] = np.arange(1.0, model.nv + 1)
     before = data.qvel.copy()
@@ -98,20 +96,21 @@ def test_a_body_waits_at_home_for_its_drop_and_then_falls_freely(model) -> None:
 
 
 def test_a_body_may_be_dropped_again_from_its_first_place(model) -> None:
-    """Between its two drops it is held at home, for the second one already waits."""
+    """Between the two drops the body waits at home for the second drop."""
     data = run(model, [DropEntry("stone", 0.4), DropEntry("stone", 0.2, position=(0, 0, 8))], 0.3)
     np.testing.assert_allclose(data.qpos[1:4], [0, 0, 3], atol=1e-3)
 
 
-def test_events_happen_once_and_in_the_order_of_time_not_of_the_file(model) -> None:
+def test_events_happen_once_and_in_the_order_of_time(model) -> None:
     places = [PlaceEntry("stone", time, position=(time, 0, 3)) for time in (0.3, 0.1, 0.2)]
     for seconds, expected in ((0.05, 0.0), (0.15, 0.1), (0.25, 0.2), (0.45, 0.3)):
         data = run(model, places, seconds)
         assert data.qpos[1] == pytest.approx(expected)
-    assert data.qvel[3] < -1, "after its last place it has fallen on, not been placed at each step"
+    # it falls after its last placement, so it was not placed at each step
+    assert data.qvel[3] < -1
 
 
-def test_a_time_within_round_off_of_a_step_belongs_to_it(model) -> None:
+def test_a_time_within_round_off_of_a_step_belongs_to_the_step(model) -> None:
     data = mujoco.MjData(model)
     data.time = 0.1 + 0.2 - 1e-12
     script(model, PlaceEntry("stone", 0.3, position=(1, 1, 1))).apply(data, {})
