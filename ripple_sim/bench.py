@@ -405,58 +405,18 @@ def as_text(report: Mapping[str, Any]) -> str:
     """Lay a report out for reading: a title and a table for each measurement."""
     machine = report["machine"]
     energy = report["energy"]
-    gl = {n: f"{rate / 1e6:,.0f}" for n, rate in report["gl"].items() if rate is not None}
-    rates = [
-        [
-            n,
-            *(f"{row[key] / 1e6:,.0f}" for key in ("cpu", "stream")),
-            f"{row['of stream']:.2f}",
-            gl.get(n, ""),
-        ]
-        for n, row in report["cpu"].items()
-    ]
-    meshes = [
-        [name]
-        + [f"{row[key]:,}" for key in ("triangles", "texels")]
-        + [f"{row['atlas [s]']:.2f}", f"{1e3 * row['substep [s]']:.3f}"]
-        for name, row in report["meshes"].items()
-    ]
-    coupling = [
-        [name, f"{row['touching']:.1f}"]
-        + [f"{1e3 * row[key]:.3f}" for key in ("mj_step [s]", "coupling [s]", "waves [s]")]
-        + [f"{row['of mj_step']:.2f}"]
-        for name, row in report["coupling"].items()
-    ]
-    columns = list(report["sphere"]["fem"])
-    modes = [
-        [name, *(f"{row[key]:.3g}" if key in row else "" for key in columns)]
-        for name, row in report["sphere"].items()
-    ]
     return "\n\n".join(
         [
-            (
-                f"{machine['processors']} processors, {machine['renderer']}\n"
-                f"ripple-sim {machine['version']}"
-            ),
-            (
-                "Texel updates a second, in millions; the memory bound reads 28 bytes and writes "
-                "8 a texel, in all cores\n"
-            )
-            + table(["N", "CPU", "memory bound", "of it", "OpenGL"], rates),
+            f"{machine['processors']} processors, {machine['renderer']}\n"
+            f"ripple-sim {machine['version']}",
+            "Texel updates a second, in millions; the memory bound reads 28 bytes and writes "
+            "8 a texel, in all cores\n" + _rate_table(report["cpu"], report["gl"]),
             "Meshes at N = 128: seconds for the atlas, and milliseconds a wave step on the CPU\n"
-            + table(["mesh", "triangles", "texels", "atlas", "step"], meshes),
-            (
-                f"Coupling: {BODIES} bodies rain on a target that collides as its true surface, "
-                "ms a step\n"
-            )
-            + table(
-                ["target", "touching", "mj_step", "coupling", "waves", "coupling over mj_step"],
-                coupling,
-            ),
+            + _mesh_table(report["meshes"]),
+            f"Coupling: {BODIES} bodies rain on a target that collides as its true surface, "
+            "ms a step\n" + _coupling_table(report["coupling"]),
             "Unit sphere, mode Y40 after one period: relative L2 error, and order by regression\n"
-            + table(
-                ["operator", *(key if key == "order" else f"N = {key}" for key in columns)], modes
-            ),
+            + _mode_table(report["sphere"]),
             "Energy without damping, float32\n"
             f"over {energy['steps']:,} steps: largest relative change {energy['largest']:.1e}, "
             f"trend {energy['trend']:+.1e}",
@@ -464,14 +424,80 @@ def as_text(report: Mapping[str, Any]) -> str:
     )
 
 
+def _rate_table(cpu: Mapping[Any, Any], gl: Mapping[Any, float | None]) -> str:
+    """Texel updates a second on the CPU, beside the bound of memory, and on the GPU."""
+    rows = []
+    for n, measured in cpu.items():
+        gl_rate = gl.get(n)
+        rows.append(
+            [
+                n,
+                f"{measured['cpu'] / 1e6:,.0f}",
+                f"{measured['stream'] / 1e6:,.0f}",
+                f"{measured['of stream']:.2f}",
+                "" if gl_rate is None else f"{gl_rate / 1e6:,.0f}",
+            ]
+        )
+    return table(["N", "CPU", "memory bound", "of it", "OpenGL"], rows)
+
+
+def _mesh_table(meshes: Mapping[str, Any]) -> str:
+    """Times of the atlas and of a step, by mesh."""
+    rows = []
+    for name, measured in meshes.items():
+        rows.append(
+            [
+                name,
+                f"{measured['triangles']:,}",
+                f"{measured['texels']:,}",
+                f"{measured['atlas [s]']:.2f}",
+                f"{1e3 * measured['substep [s]']:.3f}",
+            ]
+        )
+    return table(["mesh", "triangles", "texels", "atlas", "step"], rows)
+
+
+def _coupling_table(targets: Mapping[str, Any]) -> str:
+    """Times of a physics step, of the coupling and of the waves, by target."""
+    rows = []
+    for name, measured in targets.items():
+        rows.append(
+            [
+                name,
+                f"{measured['touching']:.1f}",
+                f"{1e3 * measured['mj_step [s]']:.3f}",
+                f"{1e3 * measured['coupling [s]']:.3f}",
+                f"{1e3 * measured['waves [s]']:.3f}",
+                f"{measured['of mj_step']:.2f}",
+            ]
+        )
+    head = ["target", "touching", "mj_step", "coupling", "waves", "coupling over mj_step"]
+    return table(head, rows)
+
+
+def _mode_table(operators: Mapping[str, Any]) -> str:
+    """Errors of a mode, by operator and resolution."""
+    columns = list(operators["fem"])
+    rows = []
+    for name, errors in operators.items():
+        row = [name]
+        for column in columns:
+            row.append(f"{errors[column]:.3g}" if column in errors else "")
+        rows.append(row)
+    head = ["operator"]
+    for column in columns:
+        head.append(column if column == "order" else f"N = {column}")
+    return table(head, rows)
+
+
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Align columns: the first to the left, the others to the right."""
-    widths = [max(len(line[i]) for line in [head, *rows]) for i in range(len(head))]
-    lines = (
-        [
-            line[0].ljust(widths[0]),
-            *(cell.rjust(w) for cell, w in zip(line[1:], widths[1:], strict=True)),
-        ]
-        for line in [head, *rows]
-    )
-    return "\n".join("  ".join(line).rstrip() for line in lines)
+    columns = list(zip(head, *rows, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    lines = []
+    for first, *others in [head, *rows]:
+        cells = [first.ljust(widths[0])]
+        for cell, width in zip(others, widths[1:], strict=True):
+            cells.append(cell.rjust(width))
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)

@@ -158,9 +158,10 @@ def _vendor_files() -> tuple[list[Path], str]:
         return [Path(name) for name in names.split(":")], f"__EGL_VENDOR_LIBRARY_FILENAMES={names}"
     folders = os.environ.get("__EGL_VENDOR_LIBRARY_DIRS")
     places = folders.split(":") if folders else list(_VENDOR_FOLDERS)
-    return sorted(file for place in places for file in Path(place).glob("*.json")), " or ".join(
-        places
-    )
+    files: list[Path] = []
+    for place in places:
+        files += Path(place).glob("*.json")
+    return sorted(files), " or ".join(places)
 
 
 def _library_of(file: Path) -> str | None:

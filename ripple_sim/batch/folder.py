@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import hashlib
+import itertools
 import os
 import re
 import shutil
@@ -104,7 +105,8 @@ class BatchFolder:
         Raises `BatchError` if one of them is or contains a link, which would lead out of the batch.
         """
         folders = (self.scenes, self.tars, self.failed, self.thumbnails, self.work)
-        for path in (path for folder in (self.path, *folders) for path in _entries(folder)):
+        paths = itertools.chain.from_iterable(map(_entries, (self.path, *folders)))
+        for path in paths:
             if path.is_symlink():
                 raise BatchError(
                     f"{path} is a link, which no batch makes; remove it and run the same command "

@@ -220,9 +220,11 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
         # files that fit the pattern, and in folders the files with a mesh's ending
         fitting = sorted(glob.glob(str(folder / pattern)))  # noqa: PTH207 - absolute ones too
         paths = [Path(name).resolve() for name in fitting]
-        within = [file for path in paths if path.is_dir() for file in sorted(path.iterdir())]
         found = [path for path in paths if path.is_file()]
-        found += [file for file in within if file.suffix[1:].lower() in trimesh.available_formats()]
+        for place in filter(Path.is_dir, paths):
+            for file in sorted(place.iterdir()):
+                if file.suffix[1:].lower() in trimesh.available_formats():
+                    found.append(file)
         if not found:
             raise SceneError(
                 f"plan: no mesh fits {pattern!r}: give a file, a folder or a pattern, relative "

@@ -49,9 +49,9 @@ _MAX_LISTED_FAILURES = 5
 def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
     """Write `index.html`: a thumbnail for each scene, the values drawn for it, and the totals."""
     finished = [row for row in rows if row["status"] == "finished"]
-    frames, size, seconds = (
-        sum(row[key] for row in finished) for key in ("frames", "bytes", "seconds")
-    )
+    frames = sum(row["frames"] for row in finished)
+    size = sum(row["bytes"] for row in finished)
+    seconds = sum(row["seconds"] for row in finished)
     shown = f"; the first {_MOST} are shown" if len(rows) > _MOST else ""
     summary = (
         f"{len(finished)} scenes, {frames} frames, {size / 1e6:.1f} MB, {seconds:.0f} s of work; "
@@ -117,20 +117,27 @@ def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
         }
         for number, failure in (batch.failures() | damaged).items()
     }
-    listed = [each for _, each in sorted((failed | rows).items())]
-    names = dict.fromkeys(["number", *(name for each in listed for name in each)])
-    columns = {name: [each.get(name) for each in listed] for name in names}
+    records = [record for _, record in sorted((failed | rows).items())]
+    names = {"number": None}
+    for record in records:
+        names |= dict.fromkeys(record)
+    columns = {}
+    for name in names:
+        columns[name] = [record.get(name) for record in records]
     for name, values in columns.items():
-        kinds = {
-            float if isinstance(value, int) and not isinstance(value, bool) else type(value)
-            for value in values
-        }
+        kinds = {_kind(value) for value in values}
         # values of several kinds are kept as JSON
         if len(kinds - {type(None)}) > 1 or dict in kinds:
             columns[name] = [json.dumps(value) for value in values]
     with atomic_write(batch.index) as path:
         parquet().write_table(pyarrow.table(columns), path)
-    write_page(batch, listed)
+    write_page(batch, records)
+
+
+def _kind(value: Any) -> type:
+    """Type of a value in a column, where whole numbers count as floats."""
+    is_whole = isinstance(value, int) and not isinstance(value, bool)
+    return float if is_whole else type(value)
 
 
 def row(facts: dict[str, Any], times: dict[str, Any]) -> dict[str, Any]:

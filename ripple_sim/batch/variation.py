@@ -105,9 +105,7 @@ def _places(
     if inner is None and not chosen:
         inner = table[key] = {}
     if isinstance(inner, list) and all(isinstance(item, dict) for item in inner):
-        names = [
-            next((str(item[name]) for name in _NAME_KEYS if name in item), "") for item in inner
-        ]
+        names = [_name_of(item) for item in inner]
         for number in choose(names, steps[0], "the scene"):
             item = f"{here}[{names[number] or number}]"
             if not rest:
@@ -121,6 +119,14 @@ def _places(
         raise SceneError(
             f"plan: the scene has no {'.'.join([here, *(name for name, _ in rest)])} to vary"
         )
+
+
+def _name_of(item: dict[str, Any]) -> str:
+    """The name by which a key chooses a table of a list; "" if the table has none."""
+    for key in _NAME_KEYS:
+        if key in item:
+            return str(item[key])
+    return ""
 
 
 def combined(old: Any, value: Any, apply: str) -> Any:

@@ -297,7 +297,9 @@ class ContactProblem:
         self._dt = model.opt.timestep
         pulls = adhesion(model, data)
         self._pulls = np.zeros(data.ncon) if pulls is None else pulls
-        self._pairs = {pair.key: pair for pairs in pairs_at.values() for pair in pairs}
+        self._pairs: dict[Key, Pair] = {}
+        for pairs in pairs_at.values():
+            self._pairs |= {pair.key: pair for pair in pairs}
         self._contacts = [self._rows(i, pairs) for i, pairs in pairs_at.items()]
         # the rows' regularization [1/kg] and reference acceleration [m/s^2], on surfaces without
         # mobility

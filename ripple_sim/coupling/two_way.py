@@ -12,6 +12,7 @@ their support points. They get the force after which body and surface move alike
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -548,8 +549,8 @@ class TwoWay:
             if resting is not None:
                 moving += list(self._touching(resting))
             self._just_begun = False
-        bodies = self._coupled.bodies
-        wake(model, data, (int(bodies[geom]) for key in moving for geom in key))
+        colliders = list(itertools.chain.from_iterable(moving))
+        wake(model, data, self._coupled.bodies[colliders].tolist())
 
     def _speed_under(self, key: Key) -> float:
         """Speed of the surface under a pair's place [m/s]."""

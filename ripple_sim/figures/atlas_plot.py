@@ -21,7 +21,12 @@ STRETCH_COLORS = LinearSegmentedColormap.from_list(
     "stretch", ["#1f4e8c", "#3f8fc0", "#8fd0d4", "#f6f1df", "#f4b46f", "#dd6247", "#8c1d40"], N=512
 )
 STRETCH_RANGE = 2.0
+
+# Hues of charts. Steps of 5 visit all 12 of them, far from each other; every other hue is darker.
 _HUES = 12
+_HUE_STEP = 5
+_LIGHTNESS = (0.74, 0.66)
+_SATURATION = 0.62
 
 
 def texel_stretch(atlas: Atlas) -> NDArray[np.float64]:
@@ -47,13 +52,18 @@ def chart_colors(topology: TexelTopology) -> NDArray[np.float64]:
     """A pale colour for each chart, [C, 3]; neighbouring charts differ."""
     hues = np.full(len(topology.glued), -1)
     for chart, corners in enumerate(topology.corners):
-        near = hues[np.isin(topology.corners, corners).any(axis=1)]
-        # steps of 5 hues of 12 visit all of them, far from each other
-        free = (hue for hue in (5 * (chart + k) % _HUES for k in range(_HUES)) if hue not in near)
-        hues[chart] = next(free, chart % _HUES)
-    return np.array(
-        [colorsys.hls_to_rgb(hue / _HUES, 0.74 - 0.08 * (hue % 2), 0.62) for hue in hues.tolist()]
-    )
+        taken = hues[np.isin(topology.corners, corners).any(axis=1)]
+        hues[chart] = chart % _HUES
+        for k in range(_HUES):
+            hue = _HUE_STEP * (chart + k) % _HUES
+            if hue not in taken:
+                hues[chart] = hue
+                break
+    colors = []
+    for hue in hues.tolist():
+        lightness = _LIGHTNESS[hue % 2]
+        colors.append(colorsys.hls_to_rgb(hue / _HUES, lightness, _SATURATION))
+    return np.array(colors)
 
 
 def plot_atlas(

@@ -7,6 +7,7 @@ frame: fields for heatmaps, marks of contacts, energies so far, and the ends of 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -190,8 +191,9 @@ class Notebook:
             self._energies[:, self._frames_followed] = [ledger.waves for ledger in ledgers]
             self._frames_followed += 1
         curves = self._energy_curves()
-        magnitudes = [magnitude(field) for fields in heatmaps for field in fields.values()]
-        impulses = [mark.impulse for marks_of_run in marks for mark in marks_of_run]
+        fields = itertools.chain.from_iterable(heatmap.values() for heatmap in heatmaps)
+        magnitudes = [magnitude(field) for field in fields]
+        impulses = [mark.impulse for mark in itertools.chain.from_iterable(marks)]
         latest_energies = [energies[-1] for _, energies in curves if len(energies)]
         return Notes(
             time=float(self._simulations[0].data.time),

@@ -371,12 +371,15 @@ def _row(
     x = away @ u / size
     y = away @ v / size
     near = 1 / (x * x + y * y + fit.softening) ** fit.power
-    orders = [(i, j) for i in range(fit.degree + 1) for j in range(fit.degree + 1 - i)]
+    # exponents of x and y in the terms of the polynomial
+    orders = []
+    for i in range(fit.degree + 1):
+        for j in range(fit.degree + 1 - i):
+            orders.append((i, j))
     growth = np.array([fit.growth ** (i + j) for i, j in orders])
     powers = np.stack([x**i * y**j for i, j in orders], axis=1)
-    solved = (
-        growth[:, None] * np.linalg.pinv(near[:, None] * powers * growth, rcond=_FIT_CUTOFF) * near
-    )
+    inverse = np.linalg.pinv(near[:, None] * powers * growth, rcond=_FIT_CUTOFF)
+    solved = growth[:, None] * inverse * near
     if laplacian is None:
         return texels, solved[0]
     second_derivatives = solved[orders.index((0, 2))] + solved[orders.index((2, 0))]
