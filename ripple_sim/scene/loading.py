@@ -12,7 +12,7 @@ import math
 import stat
 import warnings
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
@@ -37,6 +37,7 @@ from .camera_entry import check_camera
 from .events import DropEntry, Events, Script, ThrowEntry
 from .material_entry import PresetEntry, given_fields
 from .overlays import parse_request
+from .paint import paint_from_files
 from .scene import Scene, check_duration
 from .scene_file import RippleEntry, SceneFile, parse_scene
 from .source import read_toml, scene_path
@@ -320,6 +321,8 @@ def load_scene(
         If there is no such scene or file, the TOML has an unknown key or a wrong value, MuJoCo
         refuses the MJCF, or a geom or camera is not in it.
     """
+    from ripple_sim.render.visuals import MODEL_LOOK
+
     path = scene_path(name_or_path)
     table = read_toml(path, "scene file")
     if change is not None:
@@ -333,7 +336,8 @@ def load_scene(
                 "leave the seed out, or write what is to vary under [random]"
             )
         random = msgspec.structs.replace(random, seed=seed)
-    model, shifts = load_model(path.parent / content.model, random, edit)
+    of_model = [entry.geom for entry in content.ripple if entry.look == MODEL_LOOK]
+    model, shifts = load_model(path.parent / content.model, random, edit, of_model)
     targets = []
     for entry in content.ripple:
         # a geom may be named in several ways
@@ -394,9 +398,14 @@ def _with_typical_hit(model: mujoco.MjModel, entry: RippleEntry, content: SceneF
 
 
 def load_model(
-    path: Path, random: RandomEntry | None = None, edit: Edit | None = None
+    path: Path,
+    random: RandomEntry | None = None,
+    edit: Edit | None = None,
+    looks_of_files: Sequence[str] = (),
 ) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
     """Compile an MJCF file; also return how far each of its bodies was shifted at random [m].
+
+    The geoms of `looks_of_files` get the materials of their mesh files, see `paint_from_files`.
 
     Raises `SceneError` if the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the
     randomisation is invalid.
@@ -414,6 +423,8 @@ def load_model(
         # the compiler fills in missing values
         keys = [(key.name, len(key.qpos)) for key in spec.keys]
         shifts = {} if random is None else randomize(spec, random)
+        for note in paint_from_files(spec, looks_of_files):
+            warn_caller(f"{path.name}: {note}")
         if edit is not None:
             edit(spec)
         model = own_model(spec.compile())

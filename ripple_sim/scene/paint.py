@@ -1,8 +1,9 @@
-"""The colours of a mesh file on a target, as one texture of its model."""
+"""The colours of mesh files on targets, as one texture each of their model."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
@@ -10,11 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Mesh
+from ripple_sim.solver import Mesh, load_mesh
 from ripple_sim.solver.mesh.looks import MASK, ImageSource, Looks, Paint
 
 from .material_images import MaterialImages, load_image, with_holes_or_opaque
 from .packing import packed
+
+# Geoms that have meshes, and the endings of files that MuJoCo reads and that have materials.
+_MESH_TYPES = (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF)
+_FILE_ENDINGS = (".obj", ".stl")
+
+# Colour of a geom where the MJCF gives none.
+_PLAIN_RGBA = (0.5, 0.5, 0.5, 1.0)
 
 # Endings of the image NAME_texture beside a mesh file.
 _IMAGE_ENDINGS = (".png", ".jpg", ".jpeg")
@@ -68,28 +76,69 @@ def paint_target(
         if not looks.paints:
             return looks.notes
         painting = _of_looks(mesh, looks)
-    asset = spec.mesh("target")
+    _give(spec, spec.geom("target"), painting, "target")
+    return painting.notes
+
+
+def paint_from_files(spec: mujoco.MjSpec, names: Sequence[str]) -> tuple[str, ...]:
+    """Give mesh geoms the materials of their files; return what is not shown, one line each.
+
+    The MJCF says more than the file: a geom with a material or a colour keeps it, and so does a
+    mesh with texture coordinates of the MJCF.
+
+    Parameters
+    ----------
+    spec : mujoco.MjSpec
+        Changed in place.
+    names : sequence of str
+        Of geoms; names of anything else are left alone.
+    """
+    notes: list[str] = []
+    for name in names:
+        geom = spec.geom(name)
+        asset = None if geom is None or geom.type not in _MESH_TYPES else spec.mesh(geom.meshname)
+        if asset is None or geom.material or len(asset.usertexcoord):
+            continue
+        path = Path(spec.modelfiledir) / spec.meshdir / asset.file
+        if not np.array_equal(geom.rgba, _PLAIN_RGBA) or path.suffix.lower() not in _FILE_ENDINGS:
+            continue
+        mesh = load_mesh(path)
+        if mesh.looks is None or not mesh.looks.paints:
+            notes += () if mesh.looks is None else mesh.looks.notes
+            continue
+        painting = _of_looks(mesh, mesh.looks)
+        # the triangles to which the looks belong; scale and position of the asset stay
+        asset.file = ""
+        asset.uservert = mesh.V.ravel()
+        asset.userface = mesh.F.ravel()
+        _give(spec, geom, painting, f"{name}: materials of {path.name}")
+        notes += painting.notes
+    return tuple(notes)
+
+
+def _give(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, painting: Painting, name: str) -> None:
+    """Give a mesh geom a material of some name, and its mesh the texture coordinates."""
+    asset = spec.mesh(geom.meshname)
     asset.usertexcoord = painting.uv.ravel()
-    asset.userfacetexcoord = np.arange(mesh.F.size)
+    asset.userfacetexcoord = np.arange(painting.uv.size // 2)
     height, width, channels = painting.pixels.shape
     image = spec.add_texture(
-        name="target",
+        name=name,
         type=mujoco.mjtTexture.mjTEXTURE_2D,
         height=height,
         width=width,
         nchannel=channels,
     )
     image.data = painting.pixels.tobytes()
-    material = spec.add_material(name="target")
+    material = spec.add_material(name=name)
     has_holes = channels == 4
     role = mujoco.mjtTextureRole
-    material.textures[role.mjTEXROLE_RGBA if has_holes else role.mjTEXROLE_RGB] = "target"
+    material.textures[role.mjTEXROLE_RGBA if has_holes else role.mjTEXROLE_RGB] = name
     if painting.metallic is not None:
         material.metallic = painting.metallic
     if painting.roughness is not None:
         material.roughness = painting.roughness
-    spec.geom("target").material = "target"
-    return painting.notes
+    geom.material = name
 
 
 def _of_image(mesh: Mesh, mesh_path: str | Path, texture: str | Path) -> Painting:

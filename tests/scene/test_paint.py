@@ -11,9 +11,10 @@ from gltf_files import SQUARE, SQUARE_UV, Gltf, png
 from PIL import Image
 
 from ripple_sim.capture import FrameSource, snapshots
+from ripple_sim.coupling.colliders import make_collidable
 from ripple_sim.export.page_parts import data_uri
 from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
-from ripple_sim.scene import drop_scene
+from ripple_sim.scene import drop_scene, load_scene
 from ripple_sim.scene.material_images import MaterialImages, load_image
 from ripple_sim.scene.packing import packed
 from ripple_sim.scene.paint import paint_target
@@ -288,3 +289,38 @@ def test_drop_keeps_every_material_in_the_model_that_mujoco_draws(tmp_path: Path
     assert sorted(found) == [BLUE, BLUE, RED, RED]
     srgb = linear_to_srgb(srgb_to_linear(np.array(RED) / 255))
     np.testing.assert_allclose(255 * srgb, RED)
+
+
+MJCF = """<mujoco><compiler meshdir="meshes"/><asset><mesh name="a" file="a.obj" scale="2 2 2"/>
+</asset><worldbody><geom name="g" type="mesh" mesh="a" {}/></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("look", "more", "textures"),
+    [("model", "", 1), ("rubber", "", 0), ("model", 'rgba="1 0 0 1"', 0)],
+)
+def test_a_scene_file_shows_the_materials_of_a_mesh_file(
+    tmp_path: Path, look: str, more: str, textures: int
+) -> None:
+    """They reach flex colliders too, and nothing that the MJCF says is replaced."""
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes/a.mtl").write_text("newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 0 1\n")
+    text = (
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl a\nf 1 3 2\nf 1 2 4\nusemtl b\n"
+    )
+    (tmp_path / "meshes/a.obj").write_text(text + "f 2 3 4\nf 1 4 3\n")
+    (tmp_path / "scene.xml").write_text(MJCF.format(more))
+    ripple = f'model = "scene.xml"\n[[ripple]]\ngeom = "g"\nlook = "{look}"\n'
+    (tmp_path / "scene.toml").write_text(ripple)
+    for route in (None, "flex"):
+        edit = None if route is None else lambda spec: make_collidable(spec, "g", "flex")
+        model = load_scene(tmp_path / "scene.toml", edit=edit).model
+        assert model.ntex == textures
+        assert np.ptp(model.mesh_vert, axis=0).max() > 1.9
+        if textures:
+            height, width = int(model.tex_height[0]), int(model.tex_width[0])
+            pixels = model.tex_data.reshape(height, width, 3)
+            uv = model.mesh_texcoord[model.mesh_facetexcoord].mean(axis=1)
+            found = [tuple(pixels[int(v * height), int(u * width)].tolist()) for u, v in uv]
+            assert sorted(found) == [BLUE, BLUE, RED, RED]
+            assert model.mat_texid[model.geom("g").matid[0]].max() == 0
