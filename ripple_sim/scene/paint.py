@@ -75,7 +75,7 @@ def paint_target(
             return ()
         if not looks.paints:
             return looks.notes
-        painting = _of_looks(mesh, looks)
+        painting = painting_of(mesh, looks)
     _give(spec, spec.geom("target"), painting, "target")
     return painting.notes
 
@@ -106,7 +106,7 @@ def paint_from_files(spec: mujoco.MjSpec, names: Sequence[str]) -> tuple[str, ..
         if mesh.looks is None or not mesh.looks.paints:
             notes += () if mesh.looks is None else mesh.looks.notes
             continue
-        painting = _of_looks(mesh, mesh.looks)
+        painting = painting_of(mesh, mesh.looks)
         # the triangles to which the looks belong; scale and position of the asset stay
         asset.file = ""
         asset.uservert = mesh.V.ravel()
@@ -151,8 +151,8 @@ def _of_image(mesh: Mesh, mesh_path: str | Path, texture: str | Path) -> Paintin
     return Painting(load_image(texture), mesh.corner_uv * [1.0, -1.0] + [0.0, 1.0])
 
 
-def _of_looks(mesh: Mesh, looks: Looks) -> Painting:
-    """The looks of a mesh, packed into one image."""
+def painting_of(mesh: Mesh, looks: Looks) -> Painting:
+    """The looks of a mesh, which have materials, packed into one image."""
     images = MaterialImages()
     looks, transparent = with_holes_or_opaque(looks, images)
     image = packed(looks, mesh.corner_uv, images.of)
