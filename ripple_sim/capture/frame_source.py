@@ -19,8 +19,9 @@ from ripple_sim.solver.texels.chart_page import ChartPage
 
 from .exposure import FilmExposure
 from .scene_camera import focal_distance, viewpoint
+from .shown_waves import ShownWaves
 from .sighting import Sighting
-from .snapshot import ShownWaves, Snapshot, exposures_of
+from .snapshot import Snapshot, exposures_of
 
 # Texels along a chart's edge of the sphere that is drawn: the mesh of a sphere's atlas has a vertex
 # for each texel, more than pictures need.
@@ -117,7 +118,8 @@ class FrameSource:
     def submit(self, snapshot: Snapshot) -> None:
         """Begin to draw a snapshot; `fetch` returns the frames in this order."""
         pose = self.camera(snapshot).pose()
-        self.shown.look(snapshot.data, snapshot.heights, pose)
+        impulses = [] if snapshot.exposure else snapshot.impulses
+        self.shown.look(snapshot.data, snapshot.heights, pose, impulses)
         lens_point = self._lens_points[snapshot.exposure]
         if lens_point.any():
             model = self._simulation.model

@@ -2,7 +2,7 @@
 
 `exposures_of` gives the times of the exposures while the shutter is open, and their points of the
 lens. `ShutterTimes` takes the simulation to these times, also between its physics steps, and
-`drawn_heights` makes height maps. `ShownWaves` warns of waves that are too low to be seen.
+`drawn_heights` makes height maps.
 """
 
 from __future__ import annotations
@@ -20,12 +20,10 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.render.height_map_textures import AnyHeightMap, MovedHeightMap
-from ripple_sim.render.pose import Pose
 from ripple_sim.scene.camera_entry import CameraEntry
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import HeightMap
 from ripple_sim.solver.backends.gl_fields import DeviceField
-from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.waves.motion import MovedGradients
 
 Field: TypeAlias = NDArray[np.float32] | DeviceField
@@ -33,7 +31,6 @@ Heights = dict[str, Field]
 
 _STEP_DECIMALS = 9  # of times in physics steps; a time off a whole step by round-off counts as it
 
-_VISIBLE_HEIGHT = 5.0  # of waves that catch the eye [pixels]
 _GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0  # its multiples are spread evenly modulo 1
 _FULL_TURN = 360.0  # of a rotary shutter [degrees], which is then open from frame to frame
 
@@ -141,70 +138,6 @@ def drawn_heights(
         return MovedHeightMap(gradients()(np.asarray(height_map), V), V)
 
     return drawn
-
-
-class ShownWaves:
-    """Records how high the waves are in pictures, and warns of waves that no picture shows.
-
-    Parameters
-    ----------
-    ripples : Ripples
-    height : int
-        Of the pictures [pixels].
-    """
-
-    def __init__(self, ripples: Ripples, height: int) -> None:
-        self._ripples = ripples
-        self._height = height
-        # the highest wave so far, by target: height [pixels], height [m], and width of a pixel [m]
-        self._highest = dict.fromkeys(ripples, (0.0, 0.0, 1.0))
-
-    def look(self, data: mujoco.MjData, heights: Heights, pose: Pose) -> None:
-        """Record the highest waves of a picture from a pose.
-
-        Their height in pixels is that at the nearest point of the target that may be seen.
-        """
-        model = self._ripples.model
-        for name, height in heights.items():
-            geom = self._ripples.geom_ids[name]
-            distance = pose.distance
-            if geom < model.ngeom:  # a soft target has no position
-                to_middle = float(np.linalg.norm(data.geom_xpos[geom] - pose.position))
-                to_surface = to_middle - float(model.geom_rbound[geom])
-                distance = max(to_surface, 0.1 * distance)
-            pixel = pose.pixel_height(distance, self._height)  # [m]
-            peak = height.peak if isinstance(height, DeviceField) else float(np.abs(height).max())
-            self._highest[name] = max(self._highest[name], (peak / pixel, peak, pixel))
-
-    def warn_of_low(self) -> None:
-        """Warn of targets whose waves were never higher than a pixel; name a density that helps.
-
-        There is no warning of targets without waves.
-        """
-        for name, (pixels, peak, pixel) in self._highest.items():
-            if 0 < pixels < 1:
-                density = np.asarray(self._ripples[name].material.density)
-                factor = _VISIBLE_HEIGHT / pixels
-                lower = "" if density.ndim else f", {float(density) / factor:.2g} kg/m^2,"
-                warn_caller(
-                    f"no wave on {name!r} was higher than a pixel: {peak:.2g} m at most, where a "
-                    f"pixel is {pixel:.2g} m"
-                    f" wide. A density {factor:.2g} times lower{lower} would show "
-                    f"{_VISIBLE_HEIGHT:g} pixels; so may "
-                    'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in '
-                    "Python"
-                )
-
-    def warn_of_none(self) -> None:
-        """Warn of targets without any wave."""
-        for name, (pixels, _, _) in self._highest.items():
-            if pixels == 0:
-                warn_caller(
-                    f"there was no wave on {name!r}: nothing touched it. Drop or throw a body on "
-                    f"it, or poke it, in a "
-                    "scene file by [[drop]], [[throw]] or [[poke]]; or let a geom ripple that is "
-                    "touched"
-                )
 
 
 def exposures_of(camera: CameraEntry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

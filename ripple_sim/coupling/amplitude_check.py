@@ -6,24 +6,34 @@ names a material that avoids such waves.
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import math
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ripple_sim.solver import Atlas, Material, WaveSolver
 from ripple_sim.solver.errors import warn_caller
-from ripple_sim.solver.kernel import Floats32
+from ripple_sim.solver.kernel import Floats32, Ints
 from ripple_sim.solver.texels.thickness import half_thickness
 
-from .ids import GeomId
+from .ids import GeomId, TargetId
 from .model import CoupledModel
 from .suited import Extent, bearing_density
 
 # Greatest allowed height over the local radius.
 _ALLOWED_HEIGHT = 0.25
+
+# Greatest allowed depth of a dent under a body, over the greatest allowed height: the body hides
+# the dent, and the ring that leaves the dent is lower.
+_DENT_FACTOR = 3.0
+
+# A texel lies under a body for this many checks after a body pressed a texel within the radius of
+# the footprint.
+_DENT_LOOKS = 3
 
 # Share of the texels for the limit "where the object is thinnest": the rest may be thinner.
 _THINNEST_SHARE = 0.99
@@ -97,7 +107,8 @@ def steep_area(height: Floats32, per_row: Floats32, per_column: Floats32, share:
 class AmplitudeCheck:
     """Warns of waves that are too high or too steep.
 
-    Heights are compared with the local radius (`half_thickness`), slopes with 1.
+    Heights are compared with the local radius (`half_thickness`), slopes with 1. Waves are judged
+    by their rings: dents under bodies may be deeper.
 
     Parameters
     ----------
@@ -117,6 +128,11 @@ class AmplitudeCheck:
             if self._steps % _LOOK_INTERVAL[watch.waves.backend] == 0 and watch.look():
                 self._warn(geom)
         self._steps += 1
+
+    def note_load(self, target: TargetId, texels: Ints) -> None:
+        """Take note of the texels that bodies press in this step, flat indices [k]."""
+        if target in self._watched:
+            self._watched[GeomId(target)].note_load(texels)
 
     def ignore(self, geom: GeomId) -> None:
         """Turn the warning about a geom off."""
@@ -195,6 +211,13 @@ class _WatchedTarget:
         self._calm = 1e-3 * float(np.ptp(waves.rest.mesh.V, axis=0).max())
         # see `scales_of`; computed when waves are first higher than `_calm`
         self._scales: tuple[Floats32, float] | None = None
+        # texels that were pressed in each step since the last look, and before the latest looks
+        self._loaded: list[Ints] = []
+        self._loaded_before = collections.deque[list[Ints]](maxlen=_DENT_LOOKS - 1)
+
+    def note_load(self, texels: Ints) -> None:
+        """Take note of the texels that bodies press in this step, flat indices [k]."""
+        self._loaded.append(texels)
 
     def look(self) -> bool:
         """Check the waves; True if they are too high or too steep, and the warning is due."""
@@ -202,6 +225,8 @@ class _WatchedTarget:
         crests = self.waves.crests()
         if float(crests.max()) > self._calm:
             excess = self._measure(crests, self.waves.height)
+        self._loaded_before.append(self._loaded)
+        self._loaded = []
         if self.excess > 1:
             self._looks += 1
         return self.excess > 1 and (excess < self.excess or self._looks >= _FOLLOWED_LOOKS)
@@ -212,8 +237,9 @@ class _WatchedTarget:
             fields, thinnest, self._calm = scales_of(self.waves.rest)
             self._scales = fields, thinnest
         (per_limit, per_row, per_column, share), per_thinnest = self._scales
-        # crests over the greatest allowed heights
-        over = (crests * per_limit).reshape(-1)
+        rings = self._rings(crests, per_limit)
+        # rings over the greatest allowed heights
+        over = (rings * per_limit).reshape(-1)
         texel = int(over.argmax())
         high = float(over[texel])
         steep_share = steep_area(height, per_row, per_column, share)
@@ -222,15 +248,32 @@ class _WatchedTarget:
             steep = _steepness(height, per_row, per_column, share)
         excess = max(high, steep)
         if excess > max(self.excess, 1.0):
-            if high == excess:
+            if high > 1:
                 limit = 1 / float(per_limit.reshape(-1)[texel])
                 self.what = self._too_high(texel, float(crests.reshape(-1)[texel]), limit)
             else:
                 self.what = f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
         self.excess = max(self.excess, excess)
-        spread = _SPREAD_SHARE * float(crests.max()) * per_thinnest
+        spread = _SPREAD_SHARE * float(rings.max()) * per_thinnest
         self.needed = max(self.needed, excess, spread)
         return excess
+
+    def _rings(
+        self, crests: NDArray[np.float32], per_limit: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Crests [C, n, n], with dents under bodies made lower, as they may be deeper [m]."""
+        loads = [texels for step in (*self._loaded_before, self._loaded) for texels in step]
+        high = np.flatnonzero(crests * per_limit > 1)
+        if not loads or not len(high):
+            return crests
+        areas = self.waves.rest.areas.reshape(-1)
+        positions = self.waves.rest.positions.reshape(-1, 3)
+        radius = max(np.sqrt(areas[texels].sum() / np.pi) for texels in loads)
+        loaded = cKDTree(positions[np.unique(np.concatenate(loads))])
+        distances, _ = loaded.query(positions[high], distance_upper_bound=radius)
+        rings = crests.copy()
+        rings.reshape(-1)[high[np.isfinite(distances)]] /= np.float32(_DENT_FACTOR)
+        return rings
 
     def _too_high(self, texel: int, crest: float, limit: float) -> str:
         place = self.waves.rest.positions.reshape(-1, 3)[texel]

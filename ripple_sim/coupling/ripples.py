@@ -536,6 +536,8 @@ class Ripples:
         for target, waves in self._waves.items():
             step_load = loads[target] if shared is None else shared.get(target)
             waves.step(elapsed, load=step_load)
+            if isinstance(step_load, Load) and len(step_load.texels):
+                self._check_amplitude.note_load(target, step_load.texels)
         if self._two_way is not None:
             self._two_way.settle()
 

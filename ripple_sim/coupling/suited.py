@@ -49,10 +49,13 @@ _DEFAULT_DENSITY = 1000.0
 _HIT_DENT = 0.085
 _REST_DENT = 0.05
 
-# The same where forces are eased. The lightest body leaves a ring that is seen, and sinks in by the
-# second share at rest.
-_EASED_HIT_DENT = 0.17
+# The same where forces are eased. The lightest body leaves a ring that is seen once the body has
+# left, and sinks in by the second share at rest.
+_EASED_HIT_DENT = 0.265
 _EASED_REST_DENT = 0.1
+
+# Power of a footprint's width, over the least one, with which the dent of a narrower body falls.
+_NARROW_POWER = 0.3
 
 # Dent over the target's radius up to which forces are taken up, see `EasingLaw`.
 _EASED_DENT = 0.12
@@ -217,7 +220,7 @@ def suited_material(
             lightest,
             speed,
             stiffness,
-            dent=_EASED_HIT_DENT * extent.radius,
+            dent=_eased_hit_dent(lightest, extent),
             sink=_EASED_REST_DENT * extent.radius,
         )
         density = min(density, max(shown, _MIN_DENSITY_RATIO * density))
@@ -230,6 +233,16 @@ def suited_material(
         stiffness=_stiffness_of_the_whole(extent, speed, stiffness),
     )
     return SuitedMaterial(_filled_in(material, speed, stiffness, density), easing)
+
+
+def _eased_hit_dent(hit: Hit, extent: Extent) -> float:
+    """Depth of the dent that the lightest body may leave [m].
+
+    Rings of bodies narrower than the least footprint are narrow and steep: they are seen at less
+    than the full height.
+    """
+    width = min(hit.footprint / (FOOTPRINT * extent.size), 1.0)
+    return _EASED_HIT_DENT * width**_NARROW_POWER * extent.radius
 
 
 def bearing_density(

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.capture.frame_source import surface_of
-from ripple_sim.capture.snapshot import ShownWaves, drawn_heights
+from ripple_sim.capture.shown_waves import ShownWaves
+from ripple_sim.capture.snapshot import drawn_heights
 from ripple_sim.coupling.geoms import ByGeom, by_name
 from ripple_sim.coupling.ids import TargetId
 from ripple_sim.coupling.own_model import check_targets, own_data, own_model, posed
@@ -229,7 +230,7 @@ class RippleRenderer:
         self._camera_taken = _camera_content(self.scene)
         self._lights_taken = _light_content(self.scene)
         heights = {name: self._ripples[name].snapshot() for name in self._height_maps}
-        self._shown.look(state, heights, seen.pose())
+        self._shown.look(state, heights, seen.pose(), self._ripples.last_impulses)
         height_maps = {
             self._ripples.geom_ids[name]: height_map(heights[name], state)
             for name, height_map in self._height_maps.items()

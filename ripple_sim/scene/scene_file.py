@@ -94,7 +94,8 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     limit: bool = True
     """Limit drawn heights that are too large for the object, and warn of them."""
     warn: bool = True
-    """Whether to warn of such heights."""
+    """Whether to warn of such heights, and without `limit` of waves too low to be seen, as on drums
+    that are only to be heard."""
 
     def located(self, folder: Path) -> RippleEntry:
         """The same with its files' paths made relative to a folder."""

@@ -234,10 +234,13 @@ class Film:
     def warn_of_unseen(self, whole: bool) -> None:
         """Warn of waves that no frame shows, neither by their height nor by colours.
 
-        After a `whole` scene also warn of targets without any wave.
+        After a `whole` scene also warn of targets without any wave. A video with sound, and targets
+        whose scene asks for no warnings, may be for the ear.
         """
-        if not self._request.heatmap:
-            self._sources[0].shown.warn_of_low()
+        if not (self._request.heatmap or self._options.sound):
+            targets = self.simulations[0].scene.targets
+            silent = [entry.geom for entry in targets if not (entry.warn or entry.limit)]
+            self._sources[0].shown.warn_of_low(silent)
         if whole:
             self._sources[0].shown.warn_of_none()
 

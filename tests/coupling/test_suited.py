@@ -476,6 +476,16 @@ def test_a_crest_of_any_step_is_reported(before: int, after: int, end: str) -> N
             ripples.mj_step(data, nstep=40)
 
 
+@pytest.mark.parametrize(("density", "is_too_high"), [(8.0, False), (3.0, True)])
+def test_waves_are_judged_by_the_ring_and_not_by_the_dent_under_the_body(
+    density: float, is_too_high: bool
+) -> None:
+    """Both dents are deeper than a quarter of the radius, 0.125 m; one ring is higher than that."""
+    material = Material(speed=4.4, damping=1.5, stiffness=5000.0, density=density)
+    messages, _ = warned(BALL, material)
+    assert ["too high" in message for message in messages] == [True] * is_too_high
+
+
 def test_amplitude_is_checked_on_the_gl_backend_too(opengl: None) -> None:
     [message], _ = warned(BALL, WEAK, seconds=1.0, backend="gl")
     assert "geom 'target' are too" in message

@@ -334,3 +334,24 @@ def test_callbacks_must_be_functions(scene: Scene, tmp_path: Path, name: str) ->
     ):
         options = VideoOptions()
         render_video(scene, tmp_path / "o.mp4", options, **{name: 3})  # type: ignore[arg-type]
+
+
+def rings_alone(scene: Scene, tmp_path: Path, **changes: object) -> list[str]:
+    """Warnings of low waves on an egg whose dent is higher than a pixel, and whose ring is not."""
+    material = MaterialEntry(speed=0.5, density=60.0, stiffness=5e3, damping=30.0)
+    target = msgspec.structs.replace(scene.targets[0], material=material, **changes)
+    with warnings.catch_warnings(record=True, action="always") as told:
+        render_video(
+            dataclasses.replace(scene, targets=(target,)),
+            tmp_path / "frames",
+            VideoOptions(**OPTIONS, overwrite=True),
+        )
+    return [str(each.message) for each in told if "higher than a pixel" in str(each.message)]
+
+
+def test_a_ring_lower_than_a_pixel_is_told_of_though_the_dent_under_the_body_is_higher(
+    scene: Scene, tmp_path: Path
+) -> None:
+    [message] = rings_alone(scene, tmp_path)
+    assert "0.0002" in message  # m; the dent is a hundred times as deep
+    assert not rings_alone(scene, tmp_path, limit=False, warn=False), "it is for the ear"
