@@ -47,21 +47,28 @@ _MIN_COLLAPSED_SHARE = 0.01
 
 
 @kernel
-def _targets(
-    seamless: SeamlessMap, parents: Parents, cut: Bools, at_rim: Bools
-) -> tuple[Floats, Ints]:
-    """How good the best collapse of each vertex is [n], above 0, and to which corner it leads.
+def _find_targets(
+    seamless: SeamlessMap,
+    parents: Parents,
+    chosen: Bools,
+    at_rim: Bools,
+    worth: Floats,
+    target: Ints,
+) -> None:
+    """Fill in how good the best collapse of chosen vertices is, and to which corner it leads.
 
-    Corner k of triangle f has the number 3 f + k.
+    It is above 0 where there is one. Corner k of triangle f has the number 3 f + k.
     """
     n = len(seamless.z)
-    worth = np.zeros(n)
-    target = np.full(n, -1)
     seen = np.full(n, -1)
     for u in range(n):
         first = seamless.star_start[u]
         last = seamless.star_start[u + 1]
-        if not cut[u] or seamless.freedom[u] == FIXED or first == last:
+        if not chosen[u]:
+            continue
+        worth[u] = 0.0
+        target[u] = -1
+        if seamless.freedom[u] == FIXED or first == last:
             continue
         for i in range(first, last):
             f = seamless.star[i] // 3
@@ -77,7 +84,6 @@ def _targets(
                 if good > worth[u] and _meets(seamless, u, seamless.F[f, m], seen):
                     worth[u] = good
                     target[u] = 3 * f + m
-    return worth, target
 
 
 @kernel
@@ -185,12 +191,20 @@ def without_cuts(
 ) -> tuple[TriangleSurface, SeamlessMap]:
     """The same map on fewer triangles: vertices `cut` [n] are gone where that folds nothing."""
     parents = surface.parent, np.ascontiguousarray(surface.inside)
+    count = len(seamless.z)
+    worth = np.zeros(count)
+    target = np.full(count, -1)
+    changed = cut
     for _ in range(_MAX_ROUNDS):
-        worth, target = _targets(seamless, parents, cut, surface.at_rim)
+        _find_targets(seamless, parents, cut & changed, surface.at_rim, worth, target)
         chosen = _chosen(seamless, np.argsort(-worth, kind="stable"), worth, target)
         if chosen.sum() <= _MIN_COLLAPSED_SHARE * cut.sum():
             break
         left, F, turn, shift, inside = _collapse(seamless, parents, chosen, target)
+        # what a collapse is worth depends on the stars of a vertex and of its neighbours
+        changed = _with_neighbours(seamless.F, _with_neighbours(seamless.F, chosen))
+        number = np.cumsum(left) - 1
+        target = np.where(changed, -1, 3 * number[target // 3] + target % 3)
         F = F[left]
         frame = seamless.frame[left]
         turn = turn[left]
@@ -211,6 +225,13 @@ def without_cuts(
         star=star,
     )
     return TriangleSurface(surface.V[used], F, parents[0], parents[1]), seamless
+
+
+def _with_neighbours(F: Ints, chosen: Bools) -> Bools:
+    """Chosen vertices [n] and all that share one of the triangles F [m, 3] with them."""
+    wider = chosen.copy()
+    wider[F[chosen[F].any(axis=1)]] = True
+    return wider
 
 
 @kernel

@@ -28,10 +28,10 @@ _MAX_OFF_RAY = 1e-9
 _MAX_REFINEMENTS = 100
 
 # Triangles above which a part is not refined any more.
-_MAX_TRIANGLES = 40_000
+_MAX_TRIANGLES = 20_000
 
 # A part that has many triangles to begin with may grow to so many times as many.
-_MAX_TRIANGLE_GROWTH = 3
+_MAX_TRIANGLE_GROWTH = 2
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -206,6 +206,38 @@ def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat,
     list of int64 [l]
         The vertices along each line, from start to end.
     """
+    chosen = start[flat.part] >= 0
+    cut, source, paths = _cut_all(_subset(flat, chosen), start, end, on_border)
+    # those that stay whole come first, in their old order
+    is_whole = np.bincount(source, minlength=int(chosen.sum())) == 1
+    kept = np.ones(len(chosen), bool)
+    kept[np.flatnonzero(chosen)[~is_whole]] = False
+    pieces = _subset(cut, ~is_whole[source])
+    whole = _subset(flat, kept)
+    surface = TriangleSurface(
+        cut.surface.V,
+        np.concatenate([whole.surface.F, pieces.surface.F]),
+        np.concatenate([whole.surface.parent, pieces.surface.parent]),
+        np.concatenate([whole.surface.inside, pieces.surface.inside]),
+    )
+    part = np.concatenate([whole.part, pieces.part])
+    return Flat(surface, part, np.concatenate([whole.places, pieces.places])), paths
+
+
+def _subset(flat: Flat, chosen: Bools) -> Flat:
+    """Some of the triangles, with the vertices of all."""
+    surface = flat.surface
+    some = TriangleSurface(
+        surface.V, surface.F[chosen], surface.parent[chosen], surface.inside[chosen]
+    )
+    return Flat(some, flat.part[chosen], flat.places[chosen])
+
+
+def _cut_all(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat, Ints, list[Ints]]:
+    """Cut parts that all have a line; see `cut_ray`.
+
+    Returns the triangle from before in which each triangle lies, too.
+    """
     surface = flat.surface
     origin = _place_of(flat, start)
     target = _place_of(flat, end)
@@ -238,7 +270,7 @@ def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat,
     part, vertex = points[:2, np.lexsort((points[2], points[0]))].astype(np.int64)
     first = (np.diff(part, prepend=-1) != 0) | (np.diff(vertex, prepend=-1) != 0)
     paths = np.split(vertex[first], np.searchsorted(part[first], np.arange(1, len(start))))
-    return Flat(finer, flat.part[source], weights @ flat.places[source]), paths
+    return Flat(finer, flat.part[source], weights @ flat.places[source]), source, paths
 
 
 def _place_of(flat: Flat, vertex: Ints) -> Floats:
