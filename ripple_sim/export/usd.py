@@ -23,7 +23,7 @@ from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.encode.replace import MARK
 
 from .moving_mesh import Displaced, MovingMesh
-from .source import Source
+from .source import Source, Writer
 from .usd_chunks import Chunks, made_here, succeed
 from .usd_looks import Lamps, Materials, child, define_mesh, extent, place, placing, vectors
 from .visuals import solids, target_finish
@@ -45,7 +45,7 @@ _FILE_TIME = 315_619_200
 _FRAMES_IN_MEMORY = 8  # which are then appended to the file
 
 
-class UsdWriter:
+class UsdWriter(Writer):
     """Writes a run to a .usdc, .usda or .usdz file, in metres, with z up, a time code a frame."""
 
     def __init__(self, source: Source, path: Path) -> None:
