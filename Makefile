@@ -56,7 +56,7 @@ check-bounds: $(ALL)
 
 # what draws and what solves in OpenGL, on each driver that needs no GPU: Mesa's llvmpipe, the same as OpenGL 4.1, and zink
 # over Vulkan; every text of a shader also goes through Khronos's validator (packages mesa-vulkan-drivers, glslang-tools)
-DRIVEN := $(BIN)/python -m pytest -n 2 --dist worksteal -q tests/solver/backends tests/solver/gl tests/render
+DRIVEN := $(BIN)/python -m pytest -n 2 --dist worksteal -q tests/solver/backends tests/render
 test-drivers: $(ALL)
 	rm -rf build/shaders
 	PYTHONPATH=tests/support RIPPLE_SIM_SHADER_TEXTS=$(CURDIR)/build/shaders OPENBLAS_NUM_THREADS=1 $(DRIVEN) -p shader_texts
