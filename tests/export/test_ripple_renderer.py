@@ -1,4 +1,4 @@
-"""`RippleRenderer` in a loop of one's own, in place of `mujoco.Renderer`."""
+"""`RippleRenderer` in a user's loop, instead of `mujoco.Renderer`."""
 
 import copy
 import os
@@ -6,6 +6,7 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -21,11 +22,20 @@ MODEL = """<mujoco><worldbody>
   <camera name="side" pos="0 -2 0.3" xyaxes="1 0 0 0 0 1"/></worldbody></mujoco>"""
 
 
+class Egg(NamedTuple):
+    """An egg that ripples, and its renderer of 96 x 72 pixels."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    ripples: Ripples
+    renderer: RippleRenderer
+
+
 @pytest.fixture(scope="module")
-def egg():
+def egg() -> Egg:
     model, data = posed(MODEL)
     ripples = Ripples(model, {"egg": Material(speed=0.5)}, resolution=32, backend="cpu")
-    return model, data, ripples, RippleRenderer(model, ripples, width=96, height=72)
+    return Egg(model, data, ripples, RippleRenderer(model, ripples, width=96, height=72))
 
 
 def test_a_ripple_changes_the_picture_where_it_is(egg):
@@ -33,6 +43,7 @@ def test_a_ripple_changes_the_picture_where_it_is(egg):
     flat = renderer.render(data, "side").astype(int)
     ripples["egg"].add_impulse((0.0, -0.3, 0.1), 0.02, radius=0.1)
     ripples["egg"].step(0.1)
+    # more than the rounding of the tone curve
     changed = np.abs(renderer.render(data, "side").astype(int) - flat).max(axis=2) > 4
     ripples.reset()
     assert changed.any()
@@ -47,12 +58,11 @@ def test_warning_at_close_about_waves_that_no_picture_showed(egg, impulse, lines
     ripples["egg"].step(0.1)
     renderer.render(data, "side")
     ripples.reset()
-    with warnings.catch_warnings(record=True, action="always") as told:
+    with warnings.catch_warnings(record=True, action="always") as caught:
         renderer.close()
         renderer.close()
-    assert ["no wave on 'egg' was higher than a pixel" in str(each.message) for each in told] == [
-        True
-    ] * lines
+    assert len(caught) == lines
+    assert all("no wave on 'egg' was higher than a pixel" in str(w.message) for w in caught)
 
 
 def test_the_same_state_gives_the_same_picture_in_the_colour_of_the_geom(egg):

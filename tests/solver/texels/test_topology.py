@@ -36,17 +36,18 @@ def test_a_side_may_be_glued_to_the_next_side_of_its_own_chart() -> None:
 
 def test_every_step_over_a_border_leads_back(topology: TexelTopology) -> None:
     n = topology.shape[1]
-    beside = {texel: set() for texel in range(topology.texel_count)}
-    for chart, r, c in np.ndindex(*topology.shape):
-        for dr, dc in ((0, 1), (1, 0), (0, -1), (-1, 0)):
-            if not topology.rim[chart, r + 1 + dr, c + 1 + dc]:
-                beside[(chart * n + r) * n + c].add(
-                    int(topology.halo[chart, r + 1 + dr, c + 1 + dc])
-                )
-    assert all(texel in beside[other] for texel, others in beside.items() for other in others)
+    neighbours = {texel: set() for texel in range(topology.texel_count)}
+    for chart, row, column in np.ndindex(*topology.shape):
+        texel = (chart * n + row) * n + column
+        for down, right in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+            place = chart, row + 1 + down, column + 1 + right
+            if not topology.rim[place]:
+                neighbours[texel].add(int(topology.halo[place]))
+    for texel, others in neighbours.items():
+        assert all(texel in neighbours[other] for other in others)
 
 
-def test_where_no_texel_lies_a_field_with_halo_is_0() -> None:
+def test_a_field_with_halo_is_0_where_no_texel_lies() -> None:
     around = TOPOLOGIES["cube"]().with_halo(np.ones((6, 4, 4, 2)))
     assert around.shape == (6, 6, 6, 2)
     empty = np.zeros((6, 6), bool)
@@ -72,7 +73,7 @@ COLUMNS = [0, -1, -1, 0]
 
 
 def random_gluing(charts: int, rims: int, seed: int) -> np.ndarray:
-    """Sides in random pairs, but for an even number of rims."""
+    """Random pairs of sides; an even number of sides stay rims."""
     rng = np.random.default_rng(seed)
     sides = rng.permutation(4 * charts)
     glued = np.full((4 * charts, 2), -1)
@@ -90,7 +91,7 @@ def points_by_merging(glued: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     charts = len(glued)
     point = np.arange(4 * charts).reshape(charts, 4)
     at_rim = np.zeros((charts, 4), bool)
-    for _ in range(4 * charts):
+    for _ in range(4 * charts):  # enough for a number to reach every corner of its point
         for chart, side in np.ndindex(charts, 4):
             other, back = glued[chart, side]
             if other < 0:
