@@ -65,7 +65,7 @@ def soft_model() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(SOFT)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # a process has one at a time
 def browser() -> Iterator[Any]:
     with launched("--use-angle=swiftshader", "--enable-unsafe-swiftshader") as made:
         yield made
