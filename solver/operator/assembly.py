@@ -15,7 +15,7 @@ from ..errors import SolverError
 from ..kernel import Floats
 from ..texels.atlas import Atlas
 from ..texels.stencil import NO_LINKS, IrregularLinks
-from ..texels.texel_mesh import TexelMesh, softening
+from ..texels.texel_mesh import TexelMesh
 from .baselines import BASELINES, Discretisation, baseline
 from .bending import Bending
 from .coefficients import LIMITS
@@ -76,7 +76,7 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
     grip = source_grip(field["speed"] ** 2, field["stiffness"], field["bending"])
 
     if kind == "fem":
-        soft = softening(texels)
+        soft = texels.softening()
         elements = functools.partial(texels.stencil, softening=soft)
         method = Discretisation(atlas.areas, field["density"], elements)
     else:

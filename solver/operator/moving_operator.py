@@ -13,7 +13,6 @@ from ..kernel import Floats
 from ..texels.atlas import Atlas
 from ..texels.moving import MovedPlaces, MovedStencil
 from ..texels.stencil import Stencil
-from ..texels.texel_mesh import softening
 from .assembly import texel_fields
 from .bending import Bending
 from .deep_water import FluidOperator
@@ -51,7 +50,7 @@ class MovingOperator:
                 "a surface with deep fluid below cannot move; take a material without `deep`"
             )
         texels, field = texel_fields(atlas, material, operator.topology.fixed_rim)
-        soft = softening(texels)
+        soft = texels.softening()
         density = field["density"]
         squared_speed = field["speed"] ** 2
         self._rest = operator

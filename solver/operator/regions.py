@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SolverError
 from ..texels.atlas import Atlas
 from ..texels.distance import depth_in_region
-from ..texels.texel_mesh import smoothed
+from ..texels.smoothing import smoothed
 from .material import Material
 
 # Held share of a texel's neighbourhood from which on the texel is held wholly. At the outline of a

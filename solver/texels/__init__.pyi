@@ -51,6 +51,7 @@ from .moving import (
 )
 from .parts_mesh import PartsMesh as PartsMesh, parts_mesh as parts_mesh
 from .quad_pass import LEAST_RATIO as LEAST_RATIO
+from .smoothing import smoothed as smoothed
 from .stencil import (
     LINK_ENDS as LINK_ENDS,
     NO_LINKS as NO_LINKS,
@@ -65,14 +66,8 @@ from .stencil import (
 )
 from .stiffness import TexelCells as TexelCells
 from .stretch import QUANTILES as QUANTILES, stretch_summary as stretch_summary
-from .texel_mesh import (
-    TexelGrid as TexelGrid,
-    TexelMesh as TexelMesh,
-    folded_texels as folded_texels,
-    smoothed as smoothed,
-    softening as softening,
-    texel_quality as texel_quality,
-)
+from .texel_mesh import TexelGrid as TexelGrid, TexelMesh as TexelMesh
+from .texel_quality import folded_texels as folded_texels, texel_quality as texel_quality
 from .thickness import (
     LEAST as LEAST,
     half_thickness as half_thickness,

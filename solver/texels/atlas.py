@@ -17,7 +17,8 @@ from ..mesh.queries import ClosestPoints
 from .atlas_file import check_atlas_place, write_atlas_file
 from .chart_map import ChartMap, TextureCoordinates, texture_coordinates
 from .halo import sampling_matrix
-from .texel_mesh import TexelMesh, texel_quality
+from .texel_mesh import TexelMesh
+from .texel_quality import texel_quality
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from ..mesh.mesh import Mesh
 from ..mesh.queries import RayScene
 from ..mesh.volume import Volume
 from .atlas import Atlas
-from .texel_mesh import smoothed
+from .smoothing import smoothed
 
 # Lengths are shares of the longest extent of the surface.
 

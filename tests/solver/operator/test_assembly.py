@@ -25,7 +25,6 @@ from ripple_sim.solver import (
     sphere_atlas,
     texel_atlas,
 )
-from ripple_sim.solver.texels import softening
 
 
 def test_baselines_do_not_converge() -> None:
@@ -36,7 +35,7 @@ def test_baselines_do_not_converge() -> None:
 
 def test_needles_do_not_set_the_time_step_of_all() -> None:
     ball = sphere_atlas(1.0, 32)
-    assert (softening(ball.texels) == 1).all()
+    assert (ball.texels.softening() == 1).all()
     positions = ball.positions.copy()
     # nine texels almost in one place
     crowd = positions[4, 9:12, 9:12]
@@ -44,7 +43,7 @@ def test_needles_do_not_set_the_time_step_of_all() -> None:
     needles = dataclasses.replace(
         ball, texels=ball.texels.with_positions(positions, normals=ball.normals)
     )
-    factors = softening(needles.texels)
+    factors = needles.texels.softening()
     assert 1 <= (factors < 1).sum() <= 9
     assert factors.min() < 0.3
     steps = [WaveSolver(atlas, backend="cpu").stable_timestep for atlas in (ball, needles)]
@@ -64,7 +63,7 @@ def test_a_narrow_ring_is_not_softened() -> None:
     texels = TexelMesh.of(square(n).topology, places[:, 1:-1, 1:-1], beyond=places)
     texels = dataclasses.replace(texels, areas=texels.cells.areas)
     mode = np.cos(np.pi * texels.positions[..., 0] / x[-1])
-    stiffness = texels.stencil(np.ones_like(mode), softening(texels))
+    stiffness = texels.stencil(np.ones_like(mode), texels.softening())
     square_frequency = -np.sum(mode * stiffness(mode)) / np.sum(texels.areas * mode**2)
     assert square_frequency == pytest.approx((np.pi / x[-1]) ** 2, rel=1e-4)
 
@@ -83,7 +82,7 @@ def test_a_smooth_surface_gains_time_steps_and_keeps_its_mass_and_eigenvalues_of
         assert moved.max() > 0
         assert moved.sum() == pytest.approx(0, abs=1e-12)
         np.testing.assert_allclose(np.einsum("cij,cijk->k", moved, texels.positions), 0, atol=1e-12)
-        np.testing.assert_allclose(softening(texels), 1, atol=1e-9)
+        np.testing.assert_allclose(texels.softening(), 1, atol=1e-9)
         steps = [texel_atlas(each).quality()["timestep"] for each in (texels, spanned)]
         assert steps[0] > 1.03 * steps[1]
         found = eigenvalues(texels, MODES + 1)[1:]
