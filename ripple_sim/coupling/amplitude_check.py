@@ -9,7 +9,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +42,9 @@ _THINNEST_SHARE = 0.99
 _ROW_STRIDE = 4
 
 # Slopes above 1 are reported if they are on more than this share of the surface: a pit under a
-# hard body is steep, but small.
-_MIN_STEEP_AREA = 0.01
+# hard body is steep, but small. Where forces are eased, so are heights: the rims of a robot's cover
+# are thinner than any ring that can be seen.
+_MIN_AREA = 0.01
 
 # Steps between two checks of the slopes and of the crests of all steps so far, by backend. A check
 # reads them back from a GPU, which is idle meanwhile.
@@ -115,17 +116,26 @@ class AmplitudeCheck:
     coupled : CoupledModel
     waves : mapping of GeomId to WaveSolver
         By target; see `waves_changed`.
+    eased : collection of TargetId
+        Targets on which forces are eased at present, see `Easing`.
     """
 
-    def __init__(self, coupled: CoupledModel, waves: Mapping[GeomId, WaveSolver]) -> None:
+    def __init__(
+        self,
+        coupled: CoupledModel,
+        waves: Mapping[GeomId, WaveSolver],
+        eased: Collection[TargetId] = (),
+    ) -> None:
         self._coupled = coupled
+        self._eased = eased
         self._watched = {geom: _WatchedTarget(solver) for geom, solver in waves.items()}
         self._steps = 0
 
     def __call__(self) -> None:
         """Check the heights if a check is due. Call it after each step of the waves."""
         for geom, watch in list(self._watched.items()):
-            if self._steps % _LOOK_INTERVAL[watch.waves.backend] == 0 and watch.look():
+            is_due = self._steps % _LOOK_INTERVAL[watch.waves.backend] == 0
+            if is_due and watch.look(geom in self._eased):
                 self._warn(geom)
         self._steps += 1
 
@@ -146,14 +156,14 @@ class AmplitudeCheck:
         """Continue with the new waves of a geom."""
         if geom in self._watched:
             watch = self._watched[geom]
-            watch.look()  # a last check of the old waves
+            watch.look(geom in self._eased)  # a last check of the old waves
             watch.waves = waves
             waves.crests()
 
     def flush(self) -> None:
         """Check the heights a last time before the waves end, and give pending warnings."""
         for geom, watch in list(self._watched.items()):
-            watch.look()
+            watch.look(geom in self._eased)
             if watch.excess > 1:
                 self._warn(geom)
 
@@ -219,19 +229,24 @@ class _WatchedTarget:
         """Take note of the texels that bodies press in this step, flat indices [k]."""
         self._loaded.append(texels)
 
-    def look(self) -> bool:
-        """Check the waves; True if they are too high or too steep, and the warning is due."""
+    def look(self, is_eased: bool = False) -> bool:
+        """Check the waves; True if they are too high or too steep, and the warning is due.
+
+        If forces are eased, heights count that more than `_MIN_AREA` of the surface exceeds.
+        """
         excess = 0.0
         crests = self.waves.crests()
         if float(crests.max()) > self._calm:
-            excess = self._measure(crests, self.waves.height)
+            excess = self._measure(crests, self.waves.height, is_eased)
         self._loaded_before.append(self._loaded)
         self._loaded = []
         if self.excess > 1:
             self._looks += 1
         return self.excess > 1 and (excess < self.excess or self._looks >= _FOLLOWED_LOOKS)
 
-    def _measure(self, crests: NDArray[np.float32], height: NDArray[np.float32]) -> float:
+    def _measure(
+        self, crests: NDArray[np.float32], height: NDArray[np.float32], is_eased: bool
+    ) -> float:
         """Compare heights and slopes with the limits; return the greater excess."""
         if self._scales is None:
             fields, thinnest, self._calm = scales_of(self.waves.rest)
@@ -241,10 +256,12 @@ class _WatchedTarget:
         # rings over the greatest allowed heights
         over = (rings * per_limit).reshape(-1)
         texel = int(over.argmax())
+        if is_eased and over[texel] > 1:
+            texel = _exceeded_at(over, share)
         high = float(over[texel])
         steep_share = steep_area(height, per_row, per_column, share)
         steep = 0.0
-        if steep_share > _MIN_STEEP_AREA:
+        if steep_share > _MIN_AREA:
             steep = _steepness(height, per_row, per_column, share)
         excess = max(high, steep)
         if excess > max(self.excess, 1.0):
@@ -285,13 +302,18 @@ class _WatchedTarget:
 
 
 def _steepness(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
-    """The slope that `_MIN_STEEP_AREA` of the surface exceeds."""
+    """The slope that `_MIN_AREA` of the surface exceeds."""
     down = np.diff(height, axis=1, append=0) * per_row
     right = np.diff(height, axis=2, append=0) * per_column
     slope = np.hypot(down, right).ravel()
-    order = np.argsort(-slope)
+    return float(slope[_exceeded_at(slope, share)])
+
+
+def _exceeded_at(values: Floats32, share: Floats32) -> int:
+    """Flat index of the texel whose value, of values [k], `_MIN_AREA` of the surface exceeds."""
+    order = np.argsort(-values)
     area = np.cumsum(share.ravel()[order])
-    return float(slope[order[np.searchsorted(area, _MIN_STEEP_AREA)]])
+    return int(order[np.searchsorted(area, _MIN_AREA)])
 
 
 def _rounded_up(value: float) -> float:

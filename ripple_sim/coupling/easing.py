@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Floats, Ints
@@ -38,11 +39,14 @@ class EasingLaw(NamedTuple):
     thickness : float
         Half the target's thickness for which `most` holds [m]; where the target is thinner, the
         greatest force is smaller in proportion.
+    reach : float
+        Length over which a dent fades [m]; the thinnest place within it counts.
     """
 
     most: float
     rate: float
     thickness: float
+    reach: float = 0.0
 
     @classmethod
     def of(
@@ -61,7 +65,8 @@ class EasingLaw(NamedTuple):
         are as for `density_under`.
         """
         unit = depth_under(1.0, radius=radius, density=density, speed=speed, stiffness=stiffness)
-        return cls(share * thickness / unit, math.sqrt(stiffness), thickness)
+        rate = math.sqrt(stiffness)
+        return cls(share * thickness / unit, rate, thickness, speed / rate)
 
 
 class Easing:
@@ -89,13 +94,30 @@ class Easing:
         self._law = law
         self._bodies = bodies
         self._atlas = atlas
+        # by texel, see `_thinness_at`
+        self._thinness: dict[int, float] = {}
         # smoothed force of each body [N]
         self._smoothed = np.zeros(int(bodies.max(initial=0)) + 1)
 
     @functools.cached_property
-    def _thinness(self) -> Floats:
-        """Thickness of the target at each texel over the thickness of the law, at most 1."""
-        return np.minimum(half_thickness(self._atlas).reshape(-1) / self._law.thickness, 1.0)
+    def _half_thickness(self) -> Floats:
+        """Half the target's thickness at each texel [m]."""
+        return half_thickness(self._atlas).reshape(-1)
+
+    @functools.cached_property
+    def _texel_tree(self) -> KDTree:
+        """Search tree of the texels' positions."""
+        return KDTree(self._atlas.positions.reshape(-1, 3))
+
+    def _thinness_at(self, texels: Ints) -> Floats:
+        """Least thickness within a dent's reach of each texel over that of the law, at most 1."""
+        for texel in texels.tolist():
+            if texel not in self._thinness:
+                position = self._texel_tree.data[texel]
+                near = self._texel_tree.query_ball_point(position, self._law.reach)
+                thinnest = float(self._half_thickness[near].min())
+                self._thinness[texel] = min(thinnest / self._law.thickness, 1.0)
+        return np.array([self._thinness[texel] for texel in texels.tolist()])
 
     def shares(self, colliders: Ints, texels: Ints, forces: Floats, elapsed: float) -> Floats:
         """Share of each collider's force that is taken up, [k].
@@ -117,7 +139,7 @@ class Easing:
         remaining = self._smoothed * fading
         added = total * (1 - fading)
         thinnest = np.ones_like(total)
-        np.minimum.at(thinnest, bodies, self._thinness[texels])
+        np.minimum.at(thinnest, bodies, self._thinness_at(texels))
         room = np.maximum(self._law.most * thinnest - remaining, 0.0)
         share = np.divide(room, added, out=np.ones_like(added), where=added > room)
         self._smoothed = remaining + share * added

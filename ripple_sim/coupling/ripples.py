@@ -591,7 +591,7 @@ class Ripples:
             for target, law in self._easings.items()
         }
         self._loads = ContactLoads(coupled, self._waves, hits, self._eased)
-        self._check_amplitude = AmplitudeCheck(coupled, rigid)
+        self._check_amplitude = AmplitudeCheck(coupled, rigid, self._eased)
         for geom in rigid:
             if before is not None and not before.watches(geom):
                 self._check_amplitude.ignore(geom)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from ripple_sim.coupling.easing import Easing, EasingLaw
-from ripple_sim.solver import sphere_atlas
+from ripple_sim.solver import Mesh, build_atlas, sphere_atlas
 from ripple_sim.solver.operator.suited_law import depth_under
 
 DT = 0.001
@@ -64,3 +65,20 @@ def test_the_law_dents_by_its_share_of_the_thickness() -> None:
     law = EasingLaw.of(0.2, 0.3, **of)
     assert depth_under(law.most, **of) == pytest.approx(0.06)
     assert law.rate == 30.0
+
+
+def test_the_thinnest_place_within_a_dent_limits_the_force() -> None:
+    """A ring runs from a thick place into a thin one beside it."""
+    V = np.array([[x, y, z] for x in (0, 2) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    V[4:, 2] *= 0.1  # a wedge
+    atlas = build_atlas(Mesh.from_arrays(V, trimesh.convex.convex_hull(V).faces), 16, cache=False)
+    top = atlas.positions.reshape(-1, 3)
+    place = np.array([np.linalg.norm(top - [0.4, 0.0, 0.4], axis=1).argmin()])
+    forces = []
+    for reach in (0.01, 0.8):
+        law = EasingLaw(most=10.0, rate=50.0, thickness=0.5, reach=reach)
+        easing = Easing(law, BODIES, atlas)
+        shares = easing.shares(np.array([1]), place, np.array([1e6]), 1.0)
+        forces.append(1e6 * shares[0])
+    near, far = forces
+    assert near > 1.5 * far > 1.0

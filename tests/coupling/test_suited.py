@@ -1,5 +1,6 @@
 """Material and resolution chosen by the model, and warnings of waves too high or steep."""
 
+import dataclasses
 import math
 import re
 import tomllib
@@ -257,6 +258,30 @@ def test_a_density_ends_the_easing() -> None:
             run.until(0.4)
         heights.append(float(np.abs(run.ripples["target"].height).max()))
     assert heights[1] > 100 * heights[0]
+
+
+@pytest.mark.parametrize(
+    ("is_eased", "texels", "is_told"), [(False, 1, True), (True, 1, False), (True, 500, True)]
+)
+def test_where_forces_are_eased_a_height_on_less_than_a_hundredth_of_the_surface_is_no_fault(
+    is_eased: bool, texels: int, is_told: bool
+) -> None:
+    """A ring that runs into a thin rim is limited in pictures, and a density would hide it."""
+    bodies = FALLING.format(0.05, 0.2) + FALLING.format(0.2, 90.0).replace("1.6", "3")
+    model = mujoco.MjModel.from_xml_string(RAIN.format(bodies))
+    material = Material(speed=0.01, stiffness=1.0)
+    if not is_eased:
+        material = dataclasses.replace(material, density=1.0)
+    ripples = Ripples(model, {"target": material}, resolution=16, backend="cpu")
+    waves = ripples["target"]
+    height = np.zeros(waves.height.size)
+    height[:texels] = 0.2  # of a radius of 0.5 m
+    waves.height = height.reshape(waves.height.shape)
+    with warnings.catch_warnings(record=True, action="always") as caught:
+        data = mujoco.MjData(model)
+        for _ in range(20):
+            ripples.mj_step(data)
+    assert any("too high" in str(each.message) for each in caught) == is_told
 
 
 def test_a_heavier_body_is_met_by_a_heavier_surface() -> None:
