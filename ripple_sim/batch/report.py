@@ -18,7 +18,8 @@ from ripple_sim.solver.files import atomic_write
 from .finished import finished_scenes
 from .folder import BatchFolder, Failure, load_stored
 
-_MOST = 5_000  # scenes on the page
+# Scenes that the page shows, at most.
+_MAX_SHOWN_SCENES = 5_000
 
 _HEAD = """<!doctype html><meta charset="utf-8"><title>{name}</title><style>
 body{{font:15px system-ui,sans-serif;margin:2rem;color:#222;background:#fafafa}}
@@ -29,6 +30,7 @@ img{{width:100%;display:block;border-radius:3px}}.failed{{background:#fdd}}
 </style><h1>{name}</h1><p>{summary}</p><main>
 """
 
+# Facts of a scene that are columns of the index.
 _FACT_COLUMNS = (
     "number",
     "seed",
@@ -42,7 +44,7 @@ _FACT_COLUMNS = (
     "hash",
 )
 
-# failures that the status lists
+# Failures that the status lists, at most.
 _MAX_LISTED_FAILURES = 5
 
 
@@ -52,12 +54,12 @@ def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
     frames = sum(row["frames"] for row in finished)
     size = sum(row["bytes"] for row in finished)
     seconds = sum(row["seconds"] for row in finished)
-    shown = f"; the first {_MOST} are shown" if len(rows) > _MOST else ""
+    shown = f"; the first {_MAX_SHOWN_SCENES} are shown" if len(rows) > _MAX_SHOWN_SCENES else ""
     summary = (
         f"{len(finished)} scenes, {frames} frames, {size / 1e6:.1f} MB, {seconds:.0f} s of work; "
         f"{len(rows) - len(finished)} failed{shown}"
     )
-    cards = "".join(_card(batch, row) for row in rows[:_MOST])
+    cards = "".join(_card(batch, row) for row in rows[:_MAX_SHOWN_SCENES])
     name = html.escape(batch.path.name)
     with atomic_write(batch.page) as path:
         path.write_text(
@@ -108,15 +110,14 @@ def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
             rows[scene.number] = row(scene.facts(), scene.times())
         except BatchError as error:  # or another process packs it, and will write the index too
             damaged[scene.number] = Failure(error=str(error))
-    failed = {
-        number: {
+    failed: dict[int, dict[str, Any]] = {}
+    for number, failure in (batch.failures() | damaged).items():
+        failed[number] = {
             "number": number,
             "status": "failed",
             "attempts": failure.attempts,
             "error": failure.error,
         }
-        for number, failure in (batch.failures() | damaged).items()
-    }
     records = [record for _, record in sorted((failed | rows).items())]
     names = {"number": None}
     for record in records:

@@ -1,9 +1,8 @@
 """`render_cycles`: simulate a scene, write it as USD, and render it with Cycles.
 
-Cycles runs in a Blender process of its own.
-
-Beside the stage Blender is told frames, sky, soft boxes, and the floor that fades into the sky. The
-linear radiance that it gives back gets the colours of a frame as the renderer's.
+Cycles runs in a Blender process of its own. The process gets the USD stage, and settings: frames,
+sky, soft boxes, and the floor that fades into the sky. It returns linear radiance, which becomes a
+frame's colours as in the OpenGL renderer.
 """
 
 from __future__ import annotations
@@ -53,12 +52,13 @@ from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import Progress, open_video
 from ripple_sim.video.settings import EXPOSURE, check_options, frame_count, settled
 
+# Environment variable that names a Python with bpy.
 PYTHON = "RIPPLE_SIM_BPY_PYTHON"
 
 # Oldest version of bpy: before it, options of the USD importer have other names.
 OLDEST = (5, 0)
 
-# [characters]: length of the last line of a process in a message
+# Characters of a process's last line that a message quotes, at most.
 _MAX_REASON_LENGTH = 300
 
 _ADVICE = (
@@ -71,10 +71,10 @@ _ADVICE = (
 # and radiance.
 _DIFFUSE_SHARE = 0.13 * np.pi / 4
 
-# paths per pixel
+# Paths per pixel.
 SAMPLES = 64
 
-# options of a video that Cycles does not have
+# Options of a video that Cycles does not have.
 _OPENGL_ONLY = ("sound", "compare", "overlay", "passes", "resume", "transparent")
 
 
@@ -132,9 +132,10 @@ def frames_of_cycles(
     VideoError
         If the process ends before the last frame.
     """
-    told = folder / "settings.json"
+    settings_file = folder / "settings.json"
     errors = folder / "blender.log"
-    told.write_text(json.dumps({**settings, "folder": str(folder)}), encoding="utf-8")
+    text = json.dumps({**settings, "folder": str(folder)})
+    settings_file.write_text(text, encoding="utf-8")
     # Blender leaves folders behind where temporary files go
     place = {**os.environ, "TMPDIR": str(folder)}
     with (
@@ -143,7 +144,7 @@ def frames_of_cycles(
         ) as path,
         errors.open("wb") as log,
         subprocess.Popen(
-            [python, str(path), str(told)], stdout=subprocess.PIPE, stderr=log, env=place
+            [python, str(path), str(settings_file)], stdout=subprocess.PIPE, stderr=log, env=place
         ) as process,
     ):
         try:
@@ -192,6 +193,16 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
         visual = geom_visual(model, floor)
         albedo = visual.color * mean_color(model, mapping_of(model, visual))
     horizon, zenith, sky = sky_colors(lighting, pose, albedo, None)
+    boxes = []
+    for box in SOFT_BOX_LIGHTS:
+        boxes.append(
+            {
+                "azimuth": box.azimuth,
+                "elevation": box.elevation,
+                "half": [box.half_width, box.half_height],
+                "radiance": list(box.radiance),
+            }
+        )
     strength = 1.0 if studio else BESIDE_LIGHTS
     return {
         "size": list(source.size),
@@ -205,15 +216,7 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
         "fade": list(STUDIO_FADE if studio else FADE),
         "boxes_reflected": strength,
         "boxes_diffuse": _DIFFUSE_SHARE * strength if studio else 0.0,
-        "boxes": [
-            {
-                "azimuth": azimuth,
-                "elevation": elevation,
-                "half": [width, height],
-                "radiance": list(radiance),
-            }
-            for azimuth, elevation, width, height, radiance in SOFT_BOX_LIGHTS
-        ],
+        "boxes": boxes,
     }
 
 
@@ -275,8 +278,8 @@ def render_cycles(
                     simulation.advance_frame()
                 exporter.write(simulation.data, simulation.impulses)
         exported = time.perf_counter()
-        told = {**settings, "stage": str(stage), "frames": frames, "samples": samples}
-        for frame in frames_of_cycles(python, told, Path(folder)):
+        settings |= {"stage": str(stage), "frames": frames, "samples": samples}
+        for frame in frames_of_cycles(python, settings, Path(folder)):
             coded = (
                 frame.astype(np.float16)
                 if options.linear

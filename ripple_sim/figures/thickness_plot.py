@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
@@ -16,8 +17,16 @@ from .figure_file import check_plot_path, dressed, save_plot, show
 # A thin layer is dark, like bone near the skin in a scan.
 _THICKNESS_COLORS = colormaps["viridis"]
 
-# quantiles of the thickness, by area, at the ends of the colours
+# Quantiles of the thickness at the ends of the colours.
 _SHOWN_QUANTILES = (0.005, 0.97)
+
+# Least range of the colours over the greatest thickness: a layer may be as thick everywhere.
+_MIN_RANGE = 1e-9
+
+# Bars of the histogram.
+_BARS = 100
+
+_MILLIMETRES = 1e3  # in a metre
 
 
 def plot_thickness(
@@ -35,31 +44,31 @@ def plot_thickness(
     """
     check_plot_path(path)
     low, high = np.quantile(thickness, _SHOWN_QUANTILES)
-    shade = np.clip((thickness - low) / max(high - low, 1e-9 * high), 0, 1)
+    shade = np.clip((thickness - low) / max(high - low, _MIN_RANGE * high), 0, 1)
     painter = AtlasPainter(atlas, _THICKNESS_COLORS(shade)[..., :3], with_grid=False)
     figure = dressed(title, subtitle)
-    show(figure, (0.03, 0.17, 0.45, 0.70), painter.mesh(View(up=up), 800))
-    show(
-        figure,
-        (0.52, 0.17, 0.45, 0.70),
-        painter.mesh(View(azimuth=View.azimuth + 180, up=up), 800),
-        "the other side",
-    )
-    # share of the surface over thickness, in the colours of the images, as their legend
-    axes = figure.add_axes((0.3, 0.075, 0.38, 0.07))
-    bins = np.linspace(low, high, 101)
-    share, _ = np.histogram(thickness.clip(low, high), bins, weights=atlas.areas)
+    front = View(up=up)
+    back = View(azimuth=View.azimuth + 180, up=up)
+    show(figure, (0.03, 0.17, 0.45, 0.70), painter.mesh(front, 800))
+    show(figure, (0.52, 0.17, 0.45, 0.70), painter.mesh(back, 800), "the other side")
+    _histogram(figure.add_axes((0.3, 0.075, 0.38, 0.07)), thickness.clip(low, high), atlas.areas)
+    save_plot(figure, path)
+
+
+def _histogram(axes: Axes, thickness: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
+    """Share of the surface over thickness, in the colours of the images, as their legend."""
+    bins = np.linspace(thickness.min(), thickness.max(), _BARS + 1)
+    share, _ = np.histogram(thickness, bins, weights=areas)
     colors = _THICKNESS_COLORS((bins[:-1] - bins[0]) / (bins[-1] - bins[0]))
     axes.bar(
-        bins[:-1] * 1e3,
+        bins[:-1] * _MILLIMETRES,
         share / share.max(),
-        np.diff(bins) * 1e3,
+        np.diff(bins) * _MILLIMETRES,
         align="edge",
         color=colors,
         edgecolor="none",
     )
     axes.set_yticks([])
-    axes.set_xlim(low * 1e3, high * 1e3)
+    axes.set_xlim(bins[0] * _MILLIMETRES, bins[-1] * _MILLIMETRES)
     axes.spines[["top", "left", "right"]].set_visible(False)
     axes.set_xlabel("thickness [mm]; height: share of the surface", fontsize=11.5)
-    save_plot(figure, path)

@@ -163,21 +163,21 @@ def _quotients(heights: Floats, matrix: csr_array, weight: Floats) -> Floats:
 def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Floats:
     """Vectors [k, count] of the lowest modes that are not rigid.
 
-    No squared frequency is below `least` [1/s^2].
-
-    Shift-invert Lanczos (Ericsson and Ruhe 1980) finds, except for round-off, one vector of each
-    frequency. So it runs again in the complement of all vectors that are found, until nothing lower
-    remains there: no mode of several with one frequency is missed.
+    No squared frequency is below `least` [1/s^2]. Shift-invert Lanczos (Ericsson and Ruhe 1980)
+    finds, except for round-off, one vector of each frequency. So it runs again in the complement of
+    all vectors that are found, until nothing lower remains there: no mode of several with one
+    frequency is missed.
     """
     size = len(mass)
-    light = diags_array(1 / np.sqrt(mass))
-    matrix = csr_array(light @ stiffness @ light)
+    # in units of the roots of the masses the modes are eigenvectors of one symmetric matrix
+    inverse_roots = diags_array(1 / np.sqrt(mass))
+    matrix = csr_array(inverse_roots @ stiffness @ inverse_roots)
     mean = float(matrix.diagonal().mean())
     # below the lowest mode, whose square is about mean / size for a membrane, mean / size^2 for a
     # plate
     shift = least - max((mean - least) / size**2, _RESIDUAL * mean)
     solve = factorised(matrix - shift * diags_array(np.ones(size)))
-    random = np.random.default_rng(0)
+    generator = np.random.default_rng(0)
     basis = np.empty((size, 0))
     squares = np.empty(0)
     wanted = count + 2
@@ -188,14 +188,14 @@ def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Flo
 
     lanczos = LinearOperator((size, size), inverse, dtype=np.float64)
     while True:
-        start = random.standard_normal(size)
+        start = generator.standard_normal(size)
         values, new = eigsh(
             matrix, min(wanted, size - 1), sigma=shift, OPinv=lanczos, v0=start, tol=_RESIDUAL
         )
         rigid = int((squares < _ROUND_OFF * mean).sum())
         has_enough = len(squares) >= rigid + count
         if has_enough and values.min() >= (1 - _RESIDUAL) * squares[rigid + count - 1]:
-            return light @ basis[:, rigid : rigid + count]
+            return inverse_roots @ basis[:, rigid : rigid + count]
         joined = qr(np.column_stack([basis, new]), mode="economic")[0]
         squares, mixed = eigh(joined.T @ (matrix @ joined))
         basis = joined @ mixed
@@ -218,8 +218,8 @@ def _ringing(operator: WaveOperator, elastic: csr_array, heights: Floats) -> Mod
     loss = momenta @ drag.reshape(heights.shape).T
     # of modes of one frequency those that the damping does not mix
     damping = _DAMPING_SHARE * np.trace(pull) / np.trace(loss) * loss if loss.any() else 0.0
-    told_apart = pull + damping
-    mixed = eigh((told_apart + told_apart.T) / 2, (inertia + inertia.T) / 2)[1]
+    separated = pull + damping
+    mixed = eigh((separated + separated.T) / 2, (inertia + inertia.T) / 2)[1]
     squares: Floats = np.einsum("im,ij,jm->m", mixed, pull, mixed)
     rates: Floats = np.einsum("im,ij,jm->m", mixed, loss, mixed)
     order = np.argsort(squares, kind="stable")

@@ -53,8 +53,10 @@ def read_off(path: Path) -> Soup:
     F = vertex[triangles]
     corner_uv = None
     if header.pairs:
-        uv = numbers([word for words in vertices for word in [*words, "0", "0"][-4:-2]])
-        corner_uv = uv.reshape(-1, 2)[F]
+        pairs: list[str] = []
+        for words in vertices:
+            pairs += words[-2:]
+        corner_uv = numbers(pairs).reshape(-1, 2)[F]
     face = np.repeat(np.arange(len(sizes)), sizes)[triangles[:, 0]]
     colors = _face_colors(face_colors)
     if colors is not None:
@@ -121,7 +123,7 @@ def _rows_of_tokens(
 
     Faces have no colours, or colours that end with their lines: what uses up all tokens counts.
     """
-    tokens = [word for words in rows for word in words]
+    tokens = list(itertools.chain.from_iterable(rows))
     lengths = [len(words) for words in rows]
     # where the line of each token ends
     line_ends = np.repeat(np.cumsum(lengths), lengths).tolist()
@@ -198,7 +200,8 @@ def _vertex_colors(rows: list[list[str]], header: _Header) -> NDArray[np.float64
     if not sizes or not sizes <= set(_COLOR_SIZES):
         return None
     # without a header that says so, three more numbers may be a normal
-    if not header.colors and any("-" in word for each in words for word in each):
+    has_negative = any("-" in word for word in itertools.chain.from_iterable(words))
+    if not header.colors and has_negative:
         return None
     return _colors(words)
 
@@ -206,6 +209,7 @@ def _vertex_colors(rows: list[list[str]], header: _Header) -> NDArray[np.float64
 def _colors(words: list[list[str]]) -> NDArray[np.float64]:
     """Linear light and opacity [n, 4] of three or four numbers each."""
     values = np.ones((len(words), 4))
-    flat = numbers([word for each in words for word in each[:3]]).reshape(-1, 3)
+    rgb = itertools.chain.from_iterable(color[:3] for color in words)
+    flat = numbers(list(rgb)).reshape(-1, 3)
     values[:, :3] = unit_range(flat)
     return with_opacity(linear_light(values))
