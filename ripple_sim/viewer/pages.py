@@ -105,8 +105,9 @@ class Pages:
 
     @property
     def is_behind(self) -> bool:
-        """Whether a page has not yet received what was sent."""
-        return any(stream.is_full for stream, _ in self._streams.values())
+        """Whether an open page has not yet received what was sent."""
+        streams = [stream for stream, _ in self._streams.values()]
+        return any(stream.is_full for stream in streams if stream.connected)
 
     def carry_out(self, actions: dict[str, Callable[[Command], None]]) -> None:
         """Carry out all messages; what is wrong with one is said to its page."""
