@@ -297,3 +297,14 @@ def test_looks_follow_triangles_that_are_cut_turned_and_dropped(tmp_path: Path) 
     middle = (mesh.V[mesh.F][..., :2] == [1, 0]).all(axis=-1) & above[:, None]
     assert middle.sum() == 2
     np.testing.assert_allclose(mesh.looks.colors[middle][:, 0], 0.5)
+
+
+def test_lids_have_the_materials_of_their_rims(tmp_path: Path) -> None:
+    pytest.importorskip("pymeshfix")
+    (tmp_path / "a.mtl").write_text("newmtl r\nKd 1 0 0\nnewmtl b\nKd 0 0 1\n")
+    rows = [f"v {x} {y} {z} {x} {y} {z}" for x, y, z in CORNERS]
+    faces = [f"f {' '.join(str(i + 1) for i in quad)}" for quad in QUADS]
+    text = ["mtllib a.mtl", *rows, "usemtl r", *faces[:4], "usemtl b", faces[4]]
+    mesh = load_mesh(written(tmp_path, "a.obj", "\n".join(text)), repair=True)
+    assert mesh.closed and len(mesh.looks.paint) == len(mesh.F) == 12
+    np.testing.assert_allclose(mesh.looks.colors[..., :3], mesh.V[mesh.F], atol=1e-12)
