@@ -39,6 +39,12 @@ _MOST_REPEATS = 64
 _LARGEST_TRIANGLE = 256
 _SMALLEST_TRIANGLE = 4
 
+# Pixels of such blocks that are computed together: 30 MB for an array of them.
+_PIXELS_AT_ONCE = 2**20
+
+# Share of a packed image that blocks fill, about.
+_FILLED = 0.8
+
 # Factor by which images shrink until they fit, and the least scale.
 _SHRINK = 0.85
 _LEAST_SCALE = 1 / 64
@@ -104,7 +110,7 @@ def packed(looks: Looks, corner_uv: NDArray[np.float64] | None, decode: Decode) 
         paint = looks.paints[number]
         if image is not None and paint.wrap == (REPEAT, REPEAT):
             return PackedImage(_tinted(image, paint), uv, 1.0)
-    scale = 1.0
+    scale = _first_scale(looks, uv, colors, images)
     has_image = any(image is not None for image in images.values())
     while True:
         blocks = _blocks(looks, uv, colors, images, scale)
@@ -113,6 +119,29 @@ def packed(looks: Looks, corner_uv: NDArray[np.float64] | None, decode: Decode) 
         if found is not None:
             return found
         scale *= _SHRINK
+
+
+def _first_scale(
+    looks: Looks,
+    uv: NDArray[np.float64],
+    colors: NDArray[np.float64] | None,
+    images: dict[int, NDArray[np.uint8] | None],
+) -> float:
+    """Scale at which the images may fit, of the area that they take as they are; 1 at most."""
+    area = 0.0
+    for number, image in images.items():
+        if image is None:
+            continue
+        height, width = image.shape[:2]
+        places = _near_origin(uv[looks.paint == number], looks.paints[number].wrap)
+        places = places[np.ptp(places, axis=1).max(axis=1) <= _MOST_REPEATS] * [width, height]
+        if not len(places):
+            continue
+        if colors is None:
+            area += float(np.prod(np.ptp(places, axis=(0, 1)) + 2 * _MARGIN))
+        else:
+            area += float((4.0 ** _square_levels(places)).sum())
+    return min(1.0, math.sqrt(_FILLED * _LONGEST_SIDE**2 / max(area, 1.0)))
 
 
 def _varied_colors(looks: Looks) -> NDArray[np.float64] | None:
@@ -232,19 +261,32 @@ def _triangle_blocks(
     """
     height, width = image.shape[:2]
     places = uv * [width, height]
-    sides = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2).max(axis=1)
-    levels = np.ceil(np.log2(np.clip(sides, _SMALLEST_TRIANGLE, _LARGEST_TRIANGLE))).astype(int)
+    levels = _square_levels(places)
+    linear = _linear(image)
     blocks = []
     for level in np.unique(levels):
         chosen = levels == level
         side = 2**level
         weights = _square_weights(side)
-        # half a square's pixels lie beyond the triangle, and go on linearly
-        at = np.einsum("rck,mkx->mrcx", weights, places[chosen])
-        tint = np.clip(np.einsum("rck,mkx->mrcx", weights, colors[chosen]), 0.0, 1.0)
-        values = _sampled(_linear(image), at, paint.wrap) * _factor(paint) * tint
-        blocks.append(_grid(_encoded(values, paint), triangles[chosen]))
+        numbers = np.flatnonzero(chosen)
+        squares = np.empty((len(numbers), side, side, 4), np.uint8)
+        step = max(1, _PIXELS_AT_ONCE // side**2)
+        for first in range(0, len(numbers), step):
+            part = numbers[first : first + step]
+            # half a square's pixels lie beyond the triangle, and go on linearly
+            at = np.einsum("rck,mkx->mrcx", weights, places[part])
+            tint = np.clip(np.einsum("rck,mkx->mrcx", weights, colors[part]), 0.0, 1.0)
+            values = _sampled(linear, at, paint.wrap) * _factor(paint) * tint
+            squares[first : first + step] = _encoded(values, paint)
+        blocks.append(_grid(squares, triangles[numbers]))
     return blocks
+
+
+def _square_levels(places: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Exponents of two of the sides of the squares for triangles at places [m, 3, 2] [pixels]."""
+    sides = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2).max(axis=1)
+    clipped = np.clip(sides, _SMALLEST_TRIANGLE, _LARGEST_TRIANGLE)
+    return np.ceil(np.log2(clipped)).astype(np.int64)
 
 
 def _sampled(
