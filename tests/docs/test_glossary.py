@@ -43,7 +43,7 @@ ALLOWED = [
     ),
     ("solver/layouts/", "ahead", "a trial step of the descent"),
     ("solver/layouts/", "folded", "a triangle or a texel that the map turns over"),
-    ("solver/texels/texel_mesh.py", "folded", "a texel whose neighbours turn over"),
+    ("solver/texels/texel_quality.py", "folded", "a texel whose neighbours turn over"),
     ("solver/mesh/", "folded", "a polygon that turns over"),
     ("solver/", "piece pieces", "parts of a triangle, cut at the edges of the cube"),
     ("ripple_sim/cli/", "shell", "bash, zsh, fish"),
@@ -56,6 +56,7 @@ ALLOWED = [
     ("ripple_sim/render/", "shell", "the round outside of a primitive, sized apart from its core"),
     ("ripple_sim/video/", "ahead", "how many frames one stage may be in front of the next"),
     ("ripple_sim/viewer/", "press pressed", "a key or a button"),
+    ("solver/waves/", "press press_to", "the public call: a body pressed into a surface"),
 ]
 
 

@@ -22,7 +22,7 @@ from ...mesh.topology import triangle_areas
 from ..energy import FIXED, FREE, Density, Reference, star_energy
 from .collapse import without_cuts
 from .energy import Star, energy_of, gather, reference_of, relax_all, scratch, sweep, sweep_all
-from .parts import MAX_PARTS, Part, Parts, carried_over, models_of, parts_of
+from .parts import MAX_PARTS, Part, Parts, models_of, parts_of, transferred
 from .quads import CELLS, Quads, large_quads_of, quads_of
 from .seamless import (
     Frame,
@@ -384,7 +384,7 @@ def patch_map(
             relaxed[model] = _relaxed(quads[model], charts)
         surface, seamless = relaxed[model]
         if i != model:
-            surface = carried_over(surface, parts.waving[model], part)
+            surface = transferred(surface, parts.waving[model], part)
         maps.append((surface, seamless))
     surface, seamless = _joined(maps)
     triangles = np.sort(np.concatenate(still)) if still else np.empty(0, np.int64)

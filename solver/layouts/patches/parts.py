@@ -113,7 +113,7 @@ def models_of(parts: list[Part], counts: list[int]) -> list[int]:
     return models
 
 
-def carried_over(surface: TriangleSurface, model: Part, part: Part) -> TriangleSurface:
+def transferred(surface: TriangleSurface, model: Part, part: Part) -> TriangleSurface:
     """Triangles cut from a model, on another part of the same shape."""
     local = np.searchsorted(model.faces, surface.parent)
     corners = part.surface.V[part.surface.F[local]]
