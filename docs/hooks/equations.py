@@ -17,7 +17,7 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 def _with_equations(text: str) -> str:
     text = re.sub(
         r"\$\$(.+?)\$\$",
-        lambda m: latex2mathml.converter.convert(m[1].strip(), "block"),
+        lambda m: f'<div class="equation">{_block(m[1])}</div>',
         text,
         flags=re.DOTALL,
     )
@@ -26,3 +26,8 @@ def _with_equations(text: str) -> str:
     return re.sub(
         r"\$([^$\n]+)\$", lambda m: f"<span>{latex2mathml.converter.convert(m[1])}</span>", text
     )
+
+
+def _block(formula: str) -> str:
+    """A formula on a line of its own, as MathML."""
+    return latex2mathml.converter.convert(formula.strip(), "block")

@@ -131,7 +131,7 @@ class Reader:
         load_scene(whole)
 
     def _sh(self, block: Block) -> None:
-        for line in block.text.splitlines():
+        for line in block.text.replace("\\\n", " ").splitlines():
             words = shlex.split(line, comments=True)
             if words:
                 self._command(words)
