@@ -139,6 +139,23 @@ def test_a_relaxed_map_covers_the_charts_once_with_less_energy(quads: Quads) -> 
     assert patches.total_energy(seamless, reference) < 0.9 * before
 
 
+def test_a_triangle_without_area_is_opened_before_the_map_is_evened_out(quads: Quads) -> None:
+    """One of them made the energy infinite, and thirty Newton steps moved nothing."""
+    seamless = patches.seamless_map(quads)
+    triangle = np.flatnonzero(
+        (seamless.freedom[seamless.F] == FREE).all(axis=1)
+        & (seamless.turn == 0).all(axis=1)
+        & (seamless.shift == 0).all(axis=1)
+    )[0]
+    a, b, c = seamless.F[triangle]
+    reference = patches.reference_of(quads.surface.V, quads.surface.F, len(quads.glued))
+    seamless.z[a] = (seamless.z[b] + seamless.z[c]) / 2
+    assert patches.total_energy(seamless, reference) == np.inf
+    patches.relax(quads.surface.V, seamless)
+    assert patches.total_energy(seamless, reference) < np.inf
+    assert_one_to_one(seamless)
+
+
 def test_the_slope_of_newtons_system_is_that_of_the_energy(quads: Quads) -> None:
     seamless = patches.seamless_map(quads)
     reference = patches.reference_of(quads.surface.V, quads.surface.F, len(quads.glued))
