@@ -28,4 +28,4 @@ from .seamless import (
     corner_places as corner_places,
     seamless_map as seamless_map,
 )
-from .surface import TriangleSurface as TriangleSurface
+from .surface import TriangleSurface as TriangleSurface, refined as refined

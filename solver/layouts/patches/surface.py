@@ -24,6 +24,9 @@ Patterns = Mapping[int, Sequence[Sequence[int]]]  # see `SPLITS`
 # Distance from a ray up to which a vertex lies on it, in units of a polygon's radius.
 _MAX_OFF_RAY = 1e-9
 
+# Shortest side over longest side of a needle, at most.
+_MAX_NEEDLE_WIDTH = 0.125
+
 # Passes that split long edges.
 _MAX_REFINEMENTS = 100
 
@@ -300,17 +303,22 @@ def halved_chords(
 def refined(surface: TriangleSurface, longest: float) -> TriangleSurface:
     """Split edges until none is longer than `longest` [m].
 
-    The longest edge of a triangle goes first, so that needles lose length.
+    The longest edge of a triangle goes first. A needle is split in both its long sides at once: the
+    edge between their middles keeps ways across needles short, along which cells are measured.
 
     Where that would take too many triangles, longer ones are left.
     """
     most_triangles = max(_MAX_TRIANGLES, _MAX_TRIANGLE_GROWTH * len(surface.F))
     for _ in range(_MAX_REFINEMENTS):
         lengths = surface.edge_lengths
-        longest_side = lengths[surface.edges.of].argmax(axis=1)
+        sides = lengths[surface.edges.of]
+        longest_side = sides.argmax(axis=1)
         longest_edge = np.take_along_axis(surface.edges.of, longest_side[:, None], axis=1)
         chosen = np.zeros(len(lengths), bool)
         chosen[longest_edge] = True
+        is_needle = sides.min(axis=1) < _MAX_NEEDLE_WIDTH * sides.max(axis=1)
+        is_long = sides > np.median(sides, axis=1, keepdims=True) * (1 - 1e-12)
+        chosen[surface.edges.of[is_needle[:, None] & is_long]] = True
         chosen &= lengths > longest
         if not chosen.any() or len(surface.F) > most_triangles:
             break

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+import trimesh
 from genus_zero import TETRAHEDRON
 from scipy.spatial import ConvexHull
 from surfaces import disk, sphere, torus
@@ -19,6 +20,17 @@ def test_sizes_keep_to_their_bounds() -> None:
     sizes = patches.cell_sizes(Metric.of(TriangleSurface.of(ball.V, ball.F)), 0.5, (0.2, 0.3))
     assert sizes.min() >= 0.2
     assert sizes.max() <= 0.3 + 1e-12
+
+
+def test_needles_do_not_multiply_cells() -> None:
+    """Ways across needles were many times too long; a ring of 10,000 got thousands of cells."""
+    seeds = []
+    for sections in (24, 600):
+        ring = trimesh.creation.annulus(r_min=0.5, r_max=1.0, height=0.3, sections=sections)
+        mesh = Mesh.from_arrays(ring.vertices, ring.faces)
+        surface = patches.refined(TriangleSurface.of(mesh.V, mesh.F), 0.07)
+        seeds.append(len(patches.spread_seeds(Metric.of(surface), 0.25)))
+    assert seeds[1] < 1.5 * seeds[0]
 
 
 def test_texels_on_limbs_are_neither_folded_nor_wide() -> None:
