@@ -365,7 +365,7 @@ class ContactProblem:
         force = np.zeros(data.nefc)
         for attempt in range(_AFFORDING_ATTEMPTS):
             self._set_compliance(self._R + self._mobility + softness)
-            force = self._shared(force)
+            force = self._forces_of_pairs(force)
             shares = self._affordable(force, paid)
             if not shares:
                 break
@@ -436,7 +436,7 @@ class ContactProblem:
                 ratio = R[normal.start + 1] / R[normal.start]
                 contact.mu[i] = contact.friction[i, 0] * np.sqrt(ratio)
 
-    def _shared(self, force: Floats) -> Floats:
+    def _forces_of_pairs(self, force: Floats) -> Floats:
         """Forces of all rows [N], found from a guess in rounds.
 
         The surface under a pair moves by the sum F of the forces f of all its n rows, but MuJoCo's
@@ -504,10 +504,12 @@ class ContactProblem:
         )
         for rows, normal in zip(self._contacts, self._normal(force), strict=True):
             row_forces = force[rows.all]
-            along = np.array(
-                [normal * dt * float(velocity[rows.normal].mean()) for velocity in motions]
-            )
-            whole = np.array([dt * float(row_forces @ velocity[rows.all]) for velocity in motions])
+            # works of the normal force and of all rows, in both motions [J]
+            along = np.zeros(2)
+            whole = np.zeros(2)
+            for i, velocity in enumerate(motions):
+                along[i] = normal * dt * float(velocity[rows.normal].mean())
+                whole[i] = dt * float(row_forces @ velocity[rows.all])
             aside = whole - along
             works = along
             if aside.sum() > 0:

@@ -107,6 +107,17 @@ _SOFT_RESOLUTION = 64
 _MANY_TRIANGLES = 10_000
 _INTRICATE_RESOLUTION = 48
 
+# Bounds of a chosen density [kg/m^2] and stiffness [1/s^2], far beyond all real ones.
+_MIN_DENSITY = 1e-12
+_MAX_DENSITY = 1e12
+_MAX_STIFFNESS = 1e12
+
+# Least volume of a target over its area times its longest extent, for surfaces that enclose none.
+_MIN_VOLUME_SHARE = 1e-3
+
+# Keeps divisions by an area, a gravity or a mass finite.
+_MIN_DIVISOR = 1e-300
+
 # Euler characteristic of a sphere.
 _SPHERE_EULER = 2
 
@@ -141,11 +152,13 @@ class Extent(NamedTuple):
         area = float(areas.sum())
         volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6))
         size = float(np.ptp(mesh.V, axis=0).max())
-        normals /= np.maximum(2 * areas, 1e-300)[:, None]
+        normals /= np.maximum(2 * areas, _MIN_DIVISOR)[:, None]
         radii = half_thickness_at(mesh, (a + b + c) / 3 + middle, normals)
         order = np.argsort(radii)
         middle_one = order[np.searchsorted(np.cumsum(areas[order]), area / 2)]
-        return cls(size, area, max(volume, 1e-3 * size * area), float(radii[middle_one]))
+        return cls(
+            size, area, max(volume, _MIN_VOLUME_SHARE * size * area), float(radii[middle_one])
+        )
 
 
 class SuitedMaterial(NamedTuple):
@@ -264,7 +277,7 @@ def bearing_density(
     speed_by_bending = _LONGEST_WAVE_NUMBER / extent.size * bending**0.5
     speed = float(np.hypot(speed, speed_by_bending))
     density = _density_under(coupled, geom, extent, speed, stiffness, yield_height)
-    return min(density, 1e12)
+    return min(density, _MAX_DENSITY)
 
 
 def _speed_and_stiffness(
@@ -277,7 +290,7 @@ def _speed_and_stiffness(
     # dents are narrow, but no more than the time step resolves
     narrow = narrow_stiffness(extent.size, speed)
     resolved = (_MAX_PHASE_STEP / model.opt.timestep) ** 2
-    return speed, float(min(narrow, resolved, 1e12))
+    return speed, float(min(narrow, resolved, _MAX_STIFFNESS))
 
 
 def _filled_in(material: Material, speed: float, stiffness: float, density: float) -> Material:
@@ -286,7 +299,7 @@ def _filled_in(material: Material, speed: float, stiffness: float, density: floa
         "speed": speed,
         "damping": damping_for(_DECAY_TIME),
         "stiffness": stiffness,
-        "density": float(np.clip(density, 1e-12, 1e12)),
+        "density": float(np.clip(density, _MIN_DENSITY, _MAX_DENSITY)),
     }
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
@@ -416,7 +429,8 @@ def _height(coupled: CoupledModel, geom: GeomId) -> float:
     model = coupled.model
     data = mujoco.MjData(coupled.model)
     mujoco.mj_kinematics(model, data)
-    up = -model.opt.gravity / max(float(np.linalg.norm(model.opt.gravity)), 1e-300)
+    gravity = float(np.linalg.norm(model.opt.gravity))
+    up = -model.opt.gravity / max(gravity, _MIN_DIVISOR)
     above = (data.geom_xpos - data.geom_xpos[geom]) @ up
     between = np.abs(above) - model.geom_rbound - model.geom_rbound[geom]
     moves = _moves(model)
@@ -459,7 +473,7 @@ def _reduced_masses(coupled: CoupledModel, geom: GeomId) -> NDArray[np.float64]:
     """
     model = coupled.model
     masses = model.body_subtreemass[model.body_rootid]
-    inverse_by_body = np.where(model.body_weldid != 0, 1 / np.maximum(masses, 1e-300), 0.0)
+    inverse_by_body = np.where(model.body_weldid != 0, 1 / np.maximum(masses, _MIN_DIVISOR), 0.0)
     inverse = inverse_by_body[model.geom_bodyid]
     total = np.where(coupled.can_collide(geom), inverse + inverse[geom], 0.0)
     return np.divide(1.0, total, out=np.zeros_like(total), where=total > 0)

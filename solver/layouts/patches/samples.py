@@ -66,6 +66,7 @@ class Texels(NamedTuple):
 
 @kernel
 def _place(texels: Texels, chart: int, row: int, column: int) -> Floats:
+    """Position of a place in a chart with halo [m], [3]; NaN where there is nothing."""
     if texels.rim[chart, row, column] or texels.halo[chart, row, column] < 0:
         return texels.beyond[chart, row, column]
     return texels.positions[texels.halo[chart, row, column]]
@@ -81,21 +82,21 @@ def _fault(texels: Texels, flat: int) -> float:
     chart = flat // (n * n)
     row = flat // n % n + 1
     column = flat % n + 1
-    o = texels.positions[flat]
+    own = texels.positions[flat]
     normal = texels.normals[flat]
     fault = 0.0
     for i, j in _NEIGHBOURS:
         p = _place(texels, chart, row + i, column + j)
         q = _place(texels, chart, row + j, column - i)
-        a = subtract(p, o)
-        b = subtract(q, o)
+        a = subtract(p, own)
+        b = subtract(q, own)
         facing = dot(cross(a, b), normal)
         size = np.sqrt(dot(a, a) * dot(b, b))
         # NaN, where there is no neighbour, is not below the margin
         if facing < _MIN_CORNER_SINE * size:
-            fault += (1.0 if facing < 0.0 else 0.0) + (
-                _MIN_CORNER_SINE - facing / max(size, 1e-300)
-            ) ** 2
+            fold = 1.0 if facing < 0.0 else 0.0
+            lack = _MIN_CORNER_SINE - facing / max(size, 1e-300)
+            fault += fold + lack**2
     return fault
 
 
