@@ -300,7 +300,7 @@ class _Builder:
 def _patches(mesh: Mesh, resolution: int) -> Atlas:
     """Atlas of the patch layout.
 
-    Messages tell how far the work is while it takes long, and which parts lie still.
+    Messages report the stage of long work, and the parts that lie still.
     """
     with _progress_messages(mesh) as report:
         atlas = patch_atlas(mesh, resolution, report)
@@ -311,7 +311,7 @@ def _patches(mesh: Mesh, resolution: int) -> Atlas:
 
 @contextlib.contextmanager
 def _progress_messages(mesh: Mesh) -> Iterator[Callable[[str], None]]:
-    """Log from time to time how far the charts of a mesh are; yields what is to be told that."""
+    """Log the stage of a mesh's charts from time to time; yields the function that sets it."""
     done = threading.Event()
     stage = "beginning"
 

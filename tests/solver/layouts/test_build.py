@@ -186,9 +186,11 @@ def test_charts_that_take_long_are_logged(
 ) -> None:
     build = sys.modules[build_atlas.__module__]
     monkeypatch.setattr(build, "_MESSAGE_INTERVAL", 0.01)
-    monkeypatch.setattr(build, "patch_atlas", lambda mesh, resolution: time.sleep(0.2))
-    build._patches(Mesh.from_arrays(*icosphere(2)), 8)
-    assert "laying charts on a mesh of 320 triangles in 1 part: 0 s so far" in caplog.messages[0]
-    told = len(caplog.messages)
+    with build._progress_messages(Mesh.from_arrays(*icosphere(2))) as report:
+        report("cutting")
+        time.sleep(0.2)
+    begin = "laying charts on a mesh of 320 triangles in 1 part:"
+    assert f"{begin} cutting, 0 s so far" in caplog.messages[-1]
+    logged = len(caplog.messages)
     time.sleep(0.1)
-    assert len(caplog.messages) == told
+    assert len(caplog.messages) == logged  # no more once the charts are laid
