@@ -9,14 +9,13 @@ also for this program.
 """
 
 import argparse
+import sys
 from pathlib import Path
 
 from ripple_sim import RunOptions, read_plan, run_batch
 
 
 def main() -> None:
-    from dask_kubernetes.operator import KubeCluster, make_cluster_spec
-
     parser = argparse.ArgumentParser(description="Makes a batch on a Kubernetes cluster.")
     parser.add_argument("plan", type=Path)
     parser.add_argument("folder", type=Path)
@@ -24,6 +23,10 @@ def main() -> None:
     parser.add_argument("claim")
     parser.add_argument("--workers", type=int, default=100)
     options = parser.parse_args()
+    try:
+        from dask_kubernetes.operator import KubeCluster, make_cluster_spec
+    except ImportError as error:
+        sys.exit(f"{error}; this example needs: pip install dask-kubernetes")
     spec = make_cluster_spec(
         name="ripple-sim",
         image=options.image,

@@ -9,20 +9,23 @@ again.
 """
 
 import argparse
+import sys
 from pathlib import Path
 
 from ripple_sim import RunOptions, read_plan, run_batch
 
 
 def main() -> None:
-    from dask_jobqueue import SLURMCluster
-
     parser = argparse.ArgumentParser(description="Makes a batch on a Slurm cluster.")
     parser.add_argument("plan", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--jobs", type=int, default=25)
     parser.add_argument("--cores", type=int, default=40, help="of a node")
     options = parser.parse_args()
+    try:
+        from dask_jobqueue import SLURMCluster
+    except ImportError as error:
+        sys.exit(f"{error}; this example needs: pip install dask-jobqueue")
     cluster = SLURMCluster(
         cores=options.cores,
         processes=options.cores,  # one thread each: a renderer belongs to one process

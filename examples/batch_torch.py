@@ -12,6 +12,7 @@ behind an address.
 import argparse
 import io
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -51,13 +52,15 @@ def label(sample: dict[str, bytes]) -> tuple[int, float, int]:
 
 
 def main() -> None:
-    import webdataset
-    from torch.utils.data import DataLoader
-
     parser = argparse.ArgumentParser(description="Reads a batch with PyTorch.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
+    try:
+        import webdataset
+        from torch.utils.data import DataLoader
+    except ImportError as error:
+        sys.exit(f"{error}; this example needs: pip install torch webdataset")
     loader = DataLoader(
         Scenes(options.folder), batch_size=4, shuffle=True, num_workers=options.workers
     )
