@@ -200,11 +200,17 @@ def test_tendons_flexes_skins_and_rays_are_drawn(gl):
         '<sensor><rangefinder site="s"/></sensor><visual><global linewidth="3"/>'
         '<rgba rangefinder="1 0 0 1"/></visual>'
     )
-    for body, rest in ((TENDON, spatial), (SHEET, ""), (cable, ""), (TENDON, ray)):
+    cases = (
+        (TENDON, spatial, ABOVE),
+        (SHEET, "", ABOVE),
+        (cable, "", ABOVE),
+        (TENDON, ray, FRONT),  # it points down: a line has no width along itself
+    )
+    for body, rest, camera in cases:
         model, data = posed(f"<mujoco><worldbody>{FLOOR}{body}</worldbody>{rest}</mujoco>")
         unwarned = warnings.catch_warnings(action="error", category=RippleWarning)
         with unwarned, Renderer(gl, model, {}, size=SIZE) as renderer:
-            red, green, _ = np.moveaxis(renderer.render(data, {}, ABOVE).astype(int), 2, 0)
+            red, green, _ = np.moveaxis(renderer.render(data, {}, camera).astype(int), 2, 0)
         assert (red - green > 60).sum() > 50
 
 
