@@ -111,7 +111,7 @@ def test_a_name_that_another_site_points_at_this_machine_is_refused(server: Page
         assert asked(server, f"{path}?{query}", Host=f"evil.example:{port}").status == 403
 
 
-@pytest.mark.parametrize("secret", ["", "secret=", f"secret={access.new_secret()}"])
+@pytest.mark.parametrize("secret", ["", "secret=", "secret=" + 32 * "0"])
 def test_without_this_runs_secret_nothing_is_answered(server: PageServer, secret: str) -> None:
     assert asked(server, f"/?{secret}").status == 403
     with pytest.raises(InvalidStatus, match="403"):
