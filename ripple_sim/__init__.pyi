@@ -4,6 +4,7 @@ from .batch.run import RunOptions as RunOptions, run_batch as run_batch
 from .coupling.colliders import make_collidable as make_collidable
 from .coupling.ripples import Impulse as Impulse, Ripples as Ripples
 from .coupling.target import Target as Target
+from .coupling.user_sensors import add_sensor as add_sensor
 from .errors import RippleWarning as RippleWarning
 from .export.exporter import Exporter as Exporter, export_scene as export_scene
 from .export.options import ExportOptions as ExportOptions

@@ -5,7 +5,7 @@ It reads the environment's model and data, the size of its frames, and its camer
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.geoms import ByGeom
 from ripple_sim.coupling.own_model import own_data, own_model
 from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.coupling.sensor_data import SampleBlocks
+from ripple_sim.coupling.user_sensors import user_sensors
 from ripple_sim.errors import RippleError, SceneError
 from ripple_sim.solver import Material
 from ripple_sim.solver.errors import warn_caller
@@ -32,6 +34,9 @@ except ImportError as error:
 
 # Width and height of frames where an environment gives none [pixels].
 _DEFAULT_SIZE = 480
+
+# Share of the samples in a control step by which they may differ from a whole number.
+_ROUND_OFF = 1e-6
 
 
 def model_and_data(env: Any) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -106,8 +111,9 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         Geom to its look, as for `RippleRenderer`.
     lighting : str
         What lights the frames, as for `RippleRenderer`: "model", "studio" or "auto".
-    sensors : mapping, optional
-        Name to the arguments of a sensor: its `geom`, and those of `WaveSolver.sensor`, as in
+    sensors : mapping or sequence of str, optional
+        Names of sensors that `add_sensor` has added to the model; or a mapping of a name to the
+        arguments of a sensor: its `geom`, and those of `WaveSolver.sensor`, as in
         `{"tap": {"geom": "board", "at": "site", "rate": 2000}}`. The observation is then a `Dict`:
         what it was, under "observation" unless it is one already, and under each name the samples
         of a control step, float32 [samples, points], in one unbroken row from step to step, late by
@@ -136,7 +142,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         *,
         looks: ByGeom[str] | None = None,
         lighting: str = "model",
-        sensors: Mapping[str, Mapping[str, Any]] | None = None,
+        sensors: Mapping[str, Mapping[str, Any]] | Sequence[str] | None = None,
         **options: Any,
     ) -> None:
         arguments = {"looks": looks, "lighting": lighting, "sensors": sensors, **options}
@@ -156,14 +162,11 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         self._lookat: NDArray[np.float64] | None = None
         self._renders_by_itself = True
         self._in_place = None
-        # arguments of each sensor
-        self._sensor_arguments = sensors or {}
-        # samples of each sensor in a control step
-        self._counts = dict[str, int]()
-        # samples of each sensor that no observation had yet
-        self._blocks: dict[str, NDArray[np.float32]] = {}
+        self._sensor_requests = sensors or {}
+        # samples of each sensor, by control step
+        self._blocks: dict[str, SampleBlocks] = {}
         self._couple()
-        if self._sensor_arguments:
+        if self._sensor_requests:
             self.observation_space = self._space_with_sensors()
 
     def _space_with_sensors(self) -> gymnasium.spaces.Dict:
@@ -172,17 +175,13 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         spaces = (
             dict(own.spaces) if isinstance(own, gymnasium.spaces.Dict) else {"observation": own}
         )
-        control = float(getattr(self.unwrapped, "dt", 0.0))
-        for name, sensor in self._sensors.items():
-            count = sensor.rate * control
-            if name in spaces or round(count) < 1 or abs(count - round(count)) > 1e-6 * count:
+        for name, blocks in self._blocks.items():
+            if name in spaces:
                 raise SceneError(
-                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s: "
-                    "this must be a whole number, and the name none of "
-                    f"{', '.join(map(repr, spaces))}"
+                    f"the name of a sensor must be none of {', '.join(map(repr, spaces))}, got "
+                    f"{name!r}"
                 )
-            shape = round(count), len(sensor.points)
-            self._counts[name] = shape[0]
+            shape = blocks.count, len(blocks.sensor.points)
             spaces[name] = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
         return gymnasium.spaces.Dict(spaces)
 
@@ -203,11 +202,8 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             self.ripples.reset()
         else:  # environments may build a new one for each episode
             self._couple()
-        for name, sensor in self._sensors.items():
-            late = int(np.ceil(sensor.latency * sensor.rate))
-            self._blocks[name] = np.zeros(
-                (late + self._counts[name], len(sensor.points)), np.float32
-            )
+        for blocks in self._blocks.values():
+            blocks.clear()
         return self._sensed(observation), {**info, **self._info()}
 
     def render(self) -> Any:
@@ -274,22 +270,53 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         if self._in_place is not None:
             self._in_place.close()
         self._in_place = None
-        self._sensors = {}
-        for name, arguments in self._sensor_arguments.items():
+        self._blocks.clear()
+        control = float(getattr(self.unwrapped, "dt", 0.0))
+        for name, arguments in _sensor_arguments(model, self._sensor_requests).items():
             others = {key: value for key, value in arguments.items() if key != "geom"}
-            self._sensors[name] = self.ripples[arguments["geom"]].sensor(**others)
+            sensor = self.ripples[arguments["geom"]].sensor(**others)
+            count = sensor.rate * control
+            if round(count) < 1 or abs(count - round(count)) > _ROUND_OFF * count:
+                raise SceneError(
+                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s: "
+                    "this must be a whole number; choose the rate accordingly"
+                )
+            self._blocks[name] = SampleBlocks(sensor, round(count))
 
     def _sensed(self, observation: Any) -> Any:
         """An observation with the next block of each sensor, if there are any."""
-        if not self._sensors:
+        if not self._blocks:
             return observation
-        blocks = {}
-        for name, sensor in self._sensors.items():
-            samples = np.concatenate([self._blocks[name], sensor.read().values])
-            blocks[name], self._blocks[name] = np.split(samples, [self._counts[name]])
+        samples = {name: blocks.latest() for name, blocks in self._blocks.items()}
         own = isinstance(self.env.observation_space, gymnasium.spaces.Dict)
-        return {**(observation if own else {"observation": observation}), **blocks}
+        return {**(observation if own else {"observation": observation}), **samples}
 
     def _info(self) -> dict[str, Any]:
         heights = {name: self.ripples[name].height for name in self.ripples}
         return {"impulses": self.ripples.last_impulses, "heights": heights}
+
+
+def _sensor_arguments(
+    model: mujoco.MjModel, requests: Mapping[str, Mapping[str, Any]] | Sequence[str]
+) -> Mapping[str, Mapping[str, Any]]:
+    """Arguments of each sensor, by name; those of the model's own sensors are in the model."""
+    if isinstance(requests, Mapping):
+        return requests
+    records = {record.name: record for record in user_sensors(model)}
+    arguments = {}
+    for name in [requests] if isinstance(requests, str) else requests:
+        if name not in records:
+            names = ", ".join(map(repr, records)) or "none"
+            raise SceneError(
+                f"sensors must be names of sensors that add_sensor has added to the model, or a "
+                f"mapping, got {name!r}; the model's sensors are {names}"
+            )
+        record = records[name]
+        arguments[name] = {
+            "geom": record.geom,
+            "at": record.site,
+            "kind": record.kind,
+            "rate": record.rate,
+            "thickness": record.thickness,
+        }
+    return arguments

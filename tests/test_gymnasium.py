@@ -18,7 +18,14 @@ gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.envs.mujoco import MujocoEnv  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
-from ripple_sim import Material, RippleError, RippleRenderer, Ripples, RippleWarning  # noqa: E402
+from ripple_sim import (  # noqa: E402
+    Material,
+    RippleError,
+    RippleRenderer,
+    Ripples,
+    RippleWarning,
+    add_sensor,
+)
 from ripple_sim.export.environment_renders import depth_buffer  # noqa: E402
 from ripple_sim.gymnasium import (  # noqa: E402
     RippleWrapper,
@@ -507,3 +514,30 @@ def test_observations_with_sensors(path: Path) -> None:
         RippleWrapper(
             BallEnv(path), materials, sensors={"tap": sensors["tap"] | {"rate": 501}}, **OPTIONS
         )
+
+
+def test_observations_have_the_samples_of_the_models_own_sensors(tmp_path: Path) -> None:
+    spec = mujoco.MjSpec.from_string(MODEL)
+    spec.worldbody.add_site(name="top", pos=[0.2, 0.0, 0.0])
+    add_sensor(spec, "tap", geom="block", site="top", rate=1000)
+    path = tmp_path / "sensor.xml"
+    path.write_text(spec.to_xml())
+    materials = {"block": Material(speed=20.0, density=100.0)}
+    env = RippleWrapper(BallEnv(path), materials, sensors=["tap"], **OPTIONS)
+    first, _ = env.reset(seed=0)
+    observations = [env.step(np.zeros(1))[0] for _ in range(30)]
+    taps = np.array([observation["tap"] for observation in observations])
+    assert env.observation_space["tap"].shape == (10, 1) == taps[0].shape
+    assert not first["tap"].any() and taps.any()
+    # two samples in each of the five physics steps of a control step
+    data = env.unwrapped.data
+    np.testing.assert_array_equal(data.sensor("tap").data, taps[-1, -2:, 0])
+    env.reset(seed=0)
+    assert not data.sensordata.any()
+    again = [env.step(np.zeros(1))[0]["tap"] for _ in range(30)]
+    np.testing.assert_array_equal(again, taps)
+    with pytest.raises(RippleError, match="got 'rap'; the model's sensors are 'tap'"):
+        RippleWrapper(BallEnv(path), materials, sensors=["rap"], **OPTIONS)
+    with pytest.raises(RippleError, match="must be none of 'observation', got 'observation'"):
+        taken = {"observation": {"geom": "block", "at": "top", "rate": 1000}}
+        RippleWrapper(BallEnv(path), materials, sensors=taken, **OPTIONS)

@@ -17,6 +17,7 @@ from ripple_sim.solver.errors import checked, warn_caller, whole
 from ripple_sim.solver.mesh.points import check_points
 from ripple_sim.solver.operator.plate_rim import Rim
 from ripple_sim.solver.waves.footprint import Footprint, footprint
+from ripple_sim.solver.waves.sensor import Sensor
 
 from .amplitude_check import AmplitudeCheck
 from .collision_geoms import named_collision_geoms
@@ -31,6 +32,7 @@ from .load import ContactLoads, Impulse
 from .model import CoupledModel
 from .own_model import own_data, own_model
 from .rippling import RipplingSurface, rippling_surfaces
+from .sensor_data import SensorData
 from .solved_forces import SolvedForces
 from .stepping import (
     IN_TURN_WARNING,
@@ -175,6 +177,7 @@ class Ripples:
         self._scratch = mujoco.MjData(self.model)
         self._clock = StepClock()
         self._solved = SolvedForces(self.model)
+        self._sensor_data = SensorData(self.model, self._waves)
         self._warned: set[str] = set()
 
     def _check_options(self, coupled: CoupledModel) -> None:
@@ -346,6 +349,15 @@ class Ripples:
         return (places @ rotation_in_body(self.model, target)).reshape(np.shape(point))
 
     @property
+    def sensors(self) -> dict[str, Sensor]:
+        """The sensors that `add_sensor` has added to the model, by name.
+
+        They tell points, kind, rate, bandwidth and latency. Their samples are in `data.sensordata`,
+        and each step takes them out of here.
+        """
+        return dict(self._sensor_data.sensors)
+
+    @property
     def last_impulses(self) -> list[Impulse]:
         """The impulses that the surfaces received in the latest `step`, `mj_step` or `following`.
 
@@ -357,7 +369,8 @@ class Ripples:
     def step(self, data: mujoco.MjData) -> None:
         """Apply the contact forces of the latest physics step, and advance the waves.
 
-        The waves advance to `data.time`.
+        The waves advance to `data.time`. The samples of sensors that `add_sensor` has added to the
+        model are then in `data.sensordata`.
 
         After `mj_step` the forces and poses in `data` are those at the beginning of the step.
         MuJoCo holds the forces over the step, so each contact gives normal force times time step.
@@ -504,6 +517,7 @@ class Ripples:
         for target, surface in self._soft.items():
             self._waves[target].move(surface.vertices(solved))
         self._step_waves(data, solved, passed.elapsed, pending=unsolved is not None)
+        self._sensor_data.write(data)
         self._check_amplitude()
 
     def _step_waves(
@@ -649,6 +663,7 @@ class Ripples:
             self._two_way.clear()
         for waves in self._waves.values():
             waves.reset()
+        self._sensor_data.clear(self._whereabouts.latest)
 
     def _warn_once(self, kind: str, message: str | None) -> None:
         if message is not None and kind not in self._warned:

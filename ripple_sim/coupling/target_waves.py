@@ -43,6 +43,11 @@ class Whereabouts:
         self._model = model
         self._data: mujoco.MjData | None = None
 
+    @property
+    def latest(self) -> mujoco.MjData | None:
+        """The latest data; None before the first step."""
+        return self._data
+
     def follow(self, data: mujoco.MjData) -> None:
         """Take a simulation's data as the latest."""
         self._data = data

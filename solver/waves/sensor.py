@@ -114,6 +114,26 @@ class Samples(NamedTuple):
     values: NDArray[np.float32]
 
 
+def check_sensor(kind: object, rate: object, thickness: object) -> None:
+    """Raise `SolverError` if a sensor's kind, rate or thickness is invalid, see `Sensor`."""
+    if kind not in KINDS:
+        raise SolverError(
+            f"sensor kind must be one of {', '.join(map(repr, KINDS))}, got {shown(kind)}"
+        )
+    if not POSITIVE.holds(rate):
+        raise SolverError(
+            f"sensor rate must be {POSITIVE.words}, in samples a second, got {shown(rate)}"
+        )
+    needs_thickness = kind == "strain"
+    has_thickness = thickness is not None
+    valid_thickness = thickness is None or POSITIVE.holds(thickness)
+    if needs_thickness != has_thickness or not valid_thickness:
+        raise SolverError(
+            f"sensor thickness must be {POSITIVE.words} for kind 'strain' (the thickness of "
+            f"the bent sheet), and None for other kinds, got {shown(thickness)} m"
+        )
+
+
 class Sensor:
     """Measures a surface at some points from now on, along its normal; made by `WaveSolver.sensor`.
 
@@ -153,22 +173,7 @@ class Sensor:
         rate: float,
         thickness: float | None,
     ) -> None:
-        if kind not in KINDS:
-            raise SolverError(
-                f"sensor kind must be one of {', '.join(map(repr, KINDS))}, got {shown(kind)}"
-            )
-        if not POSITIVE.holds(rate):
-            raise SolverError(
-                f"sensor rate must be {POSITIVE.words}, in samples a second, got {shown(rate)}"
-            )
-        needs_thickness = kind == "strain"
-        has_thickness = thickness is not None
-        valid_thickness = thickness is None or POSITIVE.holds(thickness)
-        if needs_thickness != has_thickness or not valid_thickness:
-            raise SolverError(
-                f"sensor thickness must be {POSITIVE.words} for kind 'strain' (the thickness of "
-                f"the bent sheet), and None for other kinds, got {shown(thickness)} m"
-            )
+        check_sensor(kind, rate, thickness)
         self.points, centers = atlas.nearest(points)
         self.kind = kind
         self.rate = float(rate)
@@ -194,6 +199,11 @@ class Sensor:
     def latency(self) -> float:
         """Time from a sample until it can be read [s]."""
         return _FILTER_REACH / self._base
+
+    @property
+    def time(self) -> float:
+        """The time of the waves up to which the sensor has measured [s]."""
+        return self._latest
 
     def begin(self, time: float, values: NDArray) -> None:
         """Restart at a time [s], with the sums of the probes at that time."""
