@@ -38,6 +38,7 @@ OTHERS = ("ssh", "python3.11", "export")  # programs that are not ours
 MODEL = """<mujoco><worldbody>
   <geom name="floor" type="plane" size="2 2 1"/>
   <geom name="egg" type="ellipsoid" size="0.4 0.3 0.3" pos="0 0 0.3"/>
+  <site name="side" pos="0.4 0 0.3"/>
   <body name="ball" pos="0.1 0 1"><freejoint/><geom size="0.06"/></body>
   <body name="torso" pos="2 0 1"><freejoint/><geom name="torso" type="box" size="0.2 0.1 0.1"/>
   </body>
