@@ -35,6 +35,7 @@ from . import arguments
 
 if TYPE_CHECKING:
     from ripple_sim.scene.scene import Scene
+    from ripple_sim.viewer.opening import Opened
     from ripple_sim.viewer.session import Session
     from ripple_sim.viewer.window import Window
 
@@ -440,13 +441,14 @@ class ViewCommand:
             from ripple_sim.viewer.page_view import view_of
 
             check_port(self.port, self.host)
-            show(view_of(self._session(), self.folder, self.resolution), self.port, self.host)
+            origin = self._opened()
+            session = self._session(origin)
+            show(view_of(session, self.folder, self.resolution, origin), self.port, self.host)
 
-    def _session(self, fps: int = 60, has_skins: bool = False) -> Session:
-        from ripple_sim.viewer.opening import open_scene
-        from ripple_sim.viewer.session import Session
+    def _opened(self) -> Opened:
+        from ripple_sim.viewer.opening import opened
 
-        scene = open_scene(
+        return opened(
             self.scene,
             bodies=self.bodies,
             seed=self.seed,
@@ -454,10 +456,14 @@ class ViewCommand:
             repair=self.repair,
             wrap=self.wrap,
         )
-        return Session(scene, fps=fps, resolution=self.resolution, has_skins=has_skins)
+
+    def _session(self, origin: Opened, fps: int = 60, has_skins: bool = False) -> Session:
+        from ripple_sim.viewer.session import Session
+
+        return Session(origin.scene, fps=fps, resolution=self.resolution, has_skins=has_skins)
 
     def _window(self, off_screen: bool) -> Window:
         from ripple_sim.viewer.window import Window
 
-        session = self._session(fps=30, has_skins=True)
+        session = self._session(self._opened(), fps=30, has_skins=True)
         return Window(session, size=self.size, off_screen=off_screen, folder=self.folder)

@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -24,6 +25,7 @@ from ripple_sim.coupling.suited import suited_targets
 from ripple_sim.scene.drop import drop_scene, is_scene
 from ripple_sim.scene.loading import load_scene
 from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.source import scene_path
 from ripple_sim.solver import Material
 
 _BALL_NAME = "thrown ball {}"
@@ -153,7 +155,29 @@ def poke_strength(material: Material, size: float) -> tuple[float, float]:
     return radius, _POKE_DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0)
 
 
-def open_scene(
+class Opened(NamedTuple):
+    """A scene with balls to throw, and what it was made from.
+
+    Attributes
+    ----------
+    scene : Scene
+    file : Path or None
+        Its scene file; None for a mesh.
+    spec : mujoco.MjSpec
+        Of its model without the balls.
+    """
+
+    scene: Scene
+    file: Path | None
+    spec: mujoco.MjSpec
+
+
+def open_scene(target: str | Path, **options: Any) -> Scene:
+    """Scene by name, TOML file or mesh file, with balls to throw; arguments as for `opened`."""
+    return opened(target, **options).scene
+
+
+def opened(
     target: str | Path,
     *,
     bodies: int = 3,
@@ -161,8 +185,8 @@ def open_scene(
     up: str | None = None,
     repair: bool = False,
     wrap: bool = False,
-) -> Scene:
-    """Scene by name, TOML file or mesh file, with balls to throw.
+) -> Opened:
+    """Open a scene by name, TOML file or mesh file, with balls to throw.
 
     Parameters
     ----------
@@ -179,7 +203,8 @@ def open_scene(
         If a mesh cannot be read or does not suit the layout.
     """
     load: Callable[..., Scene] = functools.partial(load_scene, target)
-    if not is_scene(target):
+    file = scene_path(target) if is_scene(target) else None
+    if file is None:
         load = functools.partial(
             drop_scene, target, bodies=bodies, seed=seed, up=up, repair=repair, wrap=wrap
         )
@@ -191,13 +216,16 @@ def open_scene(
     # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
     mass = impulse / (1.5 * _THROW_DISTANCE * size / FLIGHT)
 
+    specs = []
+
     def edit(spec: mujoco.MjSpec) -> None:
+        specs.append(spec.copy())
         # parked balls must not widen the camera's view
         spec.stat.extent = scene.model.stat.extent
         spec.stat.center = scene.model.stat.center
         add_balls(spec, BALLS, _BALL_RADIUS * size, mass)
 
-    return load(edit=edit)
+    return Opened(load(edit=edit), file, specs[-1])
 
 
 def surface_size(scene: Scene) -> float:

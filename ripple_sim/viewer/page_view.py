@@ -6,6 +6,7 @@ draw.
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -19,20 +20,19 @@ from ripple_sim.export.exporter import Exporter, scene_source
 from ripple_sim.export.options import ExportOptions
 from ripple_sim.export.renderer import RippleRenderer
 from ripple_sim.export.source import Source
-from ripple_sim.solver import Material, RippleError
+from ripple_sim.solver import RippleError
 from ripple_sim.solver.operator.presets import PRESETS
 
+from .choices import Choices
 from .hand import Hand
+from .opening import Opened
 from .pages import Command, Pages
 from .recorder import Recorder
+from .saved_scene import moved_camera, save_scene
 from .session import OPERATORS, Session
 
 # Size of recordings [pixels].
 _RECORDED_SIZE = (1280, 720)
-
-# Factors of a material's coefficients that a page may ask for.
-_FACTORS = ("speed", "damping", "stiffness")
-_MAX_FACTOR = 8.0
 
 
 class PageView:
@@ -44,7 +44,9 @@ class PageView:
     source : Source
         What the pages show.
     folder : path
-        Where recordings and pages go.
+        Where recordings, pages and scenes go.
+    origin : Opened, optional
+        What the scene was made from; without it no scene can be saved.
 
     Attributes
     ----------
@@ -53,18 +55,25 @@ class PageView:
         Whether the user wants to leave.
     """
 
-    def __init__(self, session: Session, source: Source, folder: str | Path = ".") -> None:
+    def __init__(
+        self,
+        session: Session,
+        source: Source,
+        folder: str | Path = ".",
+        origin: Opened | None = None,
+    ) -> None:
         simulation = session.simulation
         self.session = session
         self.folder = Path(folder)
         self.closed = False
         self.pages = Pages(source, simulation.data, self._menu)
         self._source = source
+        self._origin = origin
         self._hand = Hand(simulation.model)
         self._recorder = Recorder(self.folder, simulation.scene.name, session.fps)
         self._renderer: RippleRenderer | None = None
         self._camera: mujoco.MjvCamera | int = -1
-        self._materials = {name: simulation.ripples[name].material for name in simulation.ripples}
+        self._choices = Choices(simulation.ripples)
         self._actions: dict[str, Callable[[Command], None]] = {
             "poke": self._poke,
             "throw": self._throw,
@@ -79,6 +88,7 @@ class PageView:
             "factors": self._change_factors,
             "record": self._record,
             "share": self._share,
+            "save": self._save,
             "quit": self._quit,
         }
 
@@ -166,6 +176,8 @@ class PageView:
     def _reset(self, command: Command) -> None:
         self._drop(command)
         self.session.reset()
+        if not self._choices.is_empty:
+            self._choices.apply()
         self.pages.tell(reset=True)
         self.pages.send([])
 
@@ -175,22 +187,12 @@ class PageView:
 
     def _change_preset(self, command: Command) -> None:
         """Give all surfaces a real material, or their own again for an empty name."""
-        for name, own in self._materials.items():
-            material = Material.preset(command.name) if command.name else own
-            self.session.simulation.ripples.change_material(name, **vars(material))
+        self._choices.choose_preset(self.session.simulation.ripples, command.name)
         self.pages.send([])
 
     def _change_factors(self, command: Command) -> None:
-        """Multiply coefficients of the scene's own materials."""
-        for factor in command.factors.values():
-            if not 0 <= factor <= _MAX_FACTOR:
-                raise ValueError(f"a factor must be from 0 to {_MAX_FACTOR:g}, got {factor!r}")
-        for name, own in self._materials.items():
-            changed = {
-                key: command.factors.get(key, 1.0) * np.asarray(getattr(own, key))
-                for key in _FACTORS
-            }
-            self.session.simulation.ripples.change_material(name, **changed)
+        """Multiply coefficients of the materials that are chosen."""
+        self._choices.choose_factors(command.factors)
         self.pages.send([])
 
     def _record(self, command: Command) -> None:
@@ -221,14 +223,33 @@ class PageView:
 
     def _share(self, command: Command) -> None:
         """Write the present state as a page of its own, which needs no server."""
-        number = 1
-        while (
-            path := self.folder / f"{self.session.simulation.scene.name}-{number}.html"
-        ).exists():
-            number += 1
+        path = self._new_path(".html")
         with Exporter.of(self._source, path) as exporter:
             exporter.write(self.session.simulation.data, [])
         self.pages.tell(say=f"wrote {path}")
+
+    def _save(self, command: Command) -> None:
+        """Write a scene file of what is shown, seen from the page's camera if that has moved."""
+        if self._origin is None:
+            raise ValueError("there is no file that this scene was made from; it cannot be saved")
+        path = self._new_path(".toml", ".xml")
+        shown = self._origin.scene
+        targets = [self._choices.chosen(entry) for entry in shown.targets]
+        camera = moved_camera(shown, command.camera) if command.camera else shown.camera
+        try:
+            save_scene(self._origin, targets, camera, path)
+        except OSError as error:
+            raise ValueError(f"{str(path)!r} cannot be written: {error.strerror}") from error
+        self.pages.tell(say=f"wrote {path}")
+
+    def _new_path(self, *endings: str) -> Path:
+        """The path NAME-NUMBER in the folder with the first ending, where no ending exists yet."""
+        name = self.session.simulation.scene.name
+        for number in itertools.count(1):
+            paths = [self.folder / f"{name}-{number}{ending}" for ending in endings]
+            if not any(path.exists() for path in paths):
+                break
+        return paths[0]
 
     def _quit(self, command: Command) -> None:
         self.closed = True
@@ -246,8 +267,10 @@ def free_camera(entry: dict[str, Any]) -> mujoco.MjvCamera | int:
     return camera
 
 
-def view_of(session: Session, folder: str | Path, resolution: int | None) -> PageView:
-    """The view of a session of a scene."""
+def view_of(
+    session: Session, folder: str | Path, resolution: int | None, origin: Opened | None = None
+) -> PageView:
+    """The view of a session of a scene; `origin` is what the scene was made from."""
     simulation = session.simulation
     options = ExportOptions(fps=session.fps, resolution=resolution)
-    return PageView(session, scene_source(simulation.scene, simulation, options), folder)
+    return PageView(session, scene_source(simulation.scene, simulation, options), folder, origin)

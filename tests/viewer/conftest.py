@@ -3,12 +3,17 @@
 import pytest
 
 from ripple_sim.scene import Scene
-from ripple_sim.viewer import Session, open_scene
+from ripple_sim.viewer import Opened, Session, opened
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
-    return open_scene("sphere")
+def origin() -> Opened:
+    return opened("sphere")
+
+
+@pytest.fixture(scope="module")
+def scene(origin: Opened) -> Scene:
+    return origin.scene
 
 
 @pytest.fixture

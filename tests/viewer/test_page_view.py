@@ -13,8 +13,8 @@ from pages import opened
 
 import ripple_sim
 from ripple_sim import Material, Ripples
-from ripple_sim.scene import Scene
-from ripple_sim.viewer import PageView, Session, served, view_of
+from ripple_sim.scene import MaterialEntry, Scene, load_scene
+from ripple_sim.viewer import Opened, PageView, Session, served, view_of
 
 SIZE = (320, 180)
 
@@ -26,8 +26,9 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture
-def view(scene: Scene, tmp_path: Path) -> PageView:
-    return view_of(Session(scene, resolution=12, has_skins=False), tmp_path, 12)
+def view(origin: Opened, tmp_path: Path) -> PageView:
+    session = Session(origin.scene, resolution=12, has_skins=False)
+    return view_of(session, tmp_path, 12, origin)
 
 
 class Page:
@@ -185,6 +186,29 @@ def test_pages_and_videos_are_written_to_the_folder(page: Page, opengl: None) ->
     page.wait_for(lambda: (folder / "sphere-1.mp4").exists())
     page.press("q")
     page.wait_for(lambda: page.view.closed)
+
+
+@pytest.mark.filterwarnings("ignore:the material holds")  # for waves shorter than these texels
+def test_a_saved_scene_shows_what_the_page_shows(page: Page) -> None:
+    origin = page.view._origin.scene
+    page.tab.click("#tune")
+    page.tab.click("#save")
+    page.wait_for(lambda: (page.view.folder / "sphere-1.toml").exists())
+    saved = load_scene(page.view.folder / "sphere-1.toml")
+    assert saved.targets == origin.targets
+    assert saved.camera == origin.camera
+    page.tab.select_option("#preset", "gelatine-5")
+    page.tab.mouse.move(20, 20)
+    page.tab.mouse.down()
+    page.tab.mouse.move(60, 20)
+    page.tab.mouse.up()
+    page.tab.click("#save")
+    page.wait_for(lambda: (page.view.folder / "sphere-2.toml").exists())
+    saved = load_scene(page.view.folder / "sphere-2.toml")
+    assert saved.targets[0].material == MaterialEntry(preset="gelatine-5")
+    turned = np.degrees(page.tab.evaluate("ripplePlayer.player.orbit.azimuth"))  # of the eye
+    assert (saved.camera.azimuth - turned) % 360 == pytest.approx(180, abs=0.06)
+    assert saved.camera.azimuth != origin.camera.azimuth
 
 
 def test_a_loop_of_ones_own_is_shown_and_poked(browser: Any, scene: Scene) -> None:

@@ -21,6 +21,7 @@ function programControls(player, ui) {
   of("throw").onclick = () => throwBall(player, ui);
   of("record").onclick = () => player.send("record", {camera: cameraEntry(player)});
   of("share").onclick = () => player.send("share");
+  of("save").onclick = () => player.send("save", {camera: movedCamera(player)});
   of("copy").onclick = () => copyCamera(player, ui);
   of("quit").onclick = () => player.send("quit");
   connect(player, ui);
@@ -37,6 +38,20 @@ function throwBall(player, ui) {
 function cameraEntry(player) {
   const {back, focus, distance} = player.view(player.aspect), degrees = 180 / Math.PI;
   return {lookat: focus, distance, azimuth: degrees * Math.atan2(-back[1], -back[0]), elevation: degrees * Math.asin(-back[2])};
+}
+
+// The same for the program, in millimetres and tenths of degrees; empty while it is the scene's.
+function movedCamera(player) {
+  if (!player.orbit) return {};
+  const {lookat, distance, azimuth, elevation} = cameraEntry(player);
+  const rounded = (x, digits) => Number(x.toFixed(digits));
+  return {
+    lookat: lookat.map(x => rounded(x, 3)),
+    distance: rounded(distance, 3),
+    azimuth: rounded(azimuth, 1),
+    elevation: rounded(elevation, 1),
+    fovy: rounded(player.meta.fovy, 2),
+  };
 }
 
 function copyCamera(player, ui) {
