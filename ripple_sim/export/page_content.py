@@ -146,6 +146,11 @@ class PageContent:
         laws = {number: target.renewed() for number, target in enumerate(self.targets.values())}
         return {number: law for number, law in laws.items() if law}
 
+    def looks(self, source: Source, names: Sequence[str]) -> dict[int, dict[str, Any]]:
+        """How targets look by a source with other paints, by the targets' numbers."""
+        numbers = {name: number for number, name in enumerate(self.targets)}
+        return {numbers[name]: self.targets[name].look(source) for name in names}
+
     def chunk(self) -> PageChunk:
         """The frames that wait."""
         middles: dict[int, list[list[float]]] = {}  # of the targets that move, by number

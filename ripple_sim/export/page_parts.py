@@ -133,14 +133,6 @@ def _part(
     meta: dict[str, Any], finish: Finish, F: NDArray, fields: list[NDArray], uv: NDArray | None
 ) -> PagePart:
     """Code points and directions in 16 bits each, triangles, and corners' texture coordinates."""
-    names = ("roughness", "metallic", "sheen", "coat", "translucency", "transparency", "emission")
-    values = {name: float(getattr(finish.look, name)) for name in names}
-    look = {
-        "color": finish.color.tolist(),
-        "opacity": finish.opacity,
-        "texture": finish.texture,
-        **values,
-    }
     F, vertices, triangles = memory_order(F, fields[0])
     points, directions = (np.asarray(field, np.float64)[vertices] for field in fields)
     low = points.min(axis=0)
@@ -151,8 +143,22 @@ def _part(
         arrays.append(np.asarray(uv, "<f4")[triangles])
     counts = {"points": len(points), "triangles": len(F), "textured": uv is not None}
     return PagePart(
-        {**meta, **look, "low": low.tolist(), "size": size, **counts}, arrays, F, vertices
+        {**meta, **look_meta(finish), "low": low.tolist(), "size": size, **counts},
+        arrays,
+        F,
+        vertices,
     )
+
+
+def look_meta(finish: Finish) -> dict[str, Any]:
+    """How a part looks, for its description."""
+    names = ("roughness", "metallic", "sheen", "coat", "translucency", "transparency", "emission")
+    return {
+        "color": finish.color.tolist(),
+        "opacity": finish.opacity,
+        "texture": finish.texture,
+        **{name: float(getattr(finish.look, name)) for name in names},
+    }
 
 
 def data_uri(model: mujoco.MjModel, texture: int) -> str:

@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.ids import TargetId, is_geom
 from ripple_sim.render.surfaces.vertices import memory_order
+from ripple_sim.render.visuals.texture_mapping import TextureMapping
 from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.waves.tape import Event, Tape
 
 from .moving_mesh import MovingMesh
 from .page_coding import packed, parents_of, quantised, residuals
-from .page_parts import target_part
+from .page_parts import look_meta, target_part
 from .source import Source
+from .visuals import mean_color, target_finish
 from .wave_law import replay_reason, wave_law
 
 _MAX_TRIANGLES = 16_000  # of a target, about
@@ -89,6 +91,14 @@ class PageTarget:
         self.solves = False
         self._tape = Tape()
         self._pushes: list[float] = []  # of each frame, inwards [N s]
+
+    def look(self, source: Source) -> dict[str, Any]:
+        """How the target looks by a source with other paints, for its part of the page."""
+        finish, _ = target_finish(source, self._name, self._surface)
+        if self.part.meta["texture"] < 0 <= finish.texture:  # whose image the page does not have
+            mean = mean_color(source.model, TextureMapping(texture=finish.texture))
+            finish = finish._replace(color=finish.color * mean, texture=-1)
+        return look_meta(finish)
 
     def begin(self) -> str:
         """Begin the run with the present state; return the law of its waves, or ""."""

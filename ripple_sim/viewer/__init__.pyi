@@ -19,7 +19,7 @@ from .opening import (
 )
 from .page_server import PageServer as PageServer, served as served, show as show
 from .page_view import PageView as PageView, view_of as view_of
-from .pages import Command as Command, Pages as Pages
+from .pages import ALL_TARGETS as ALL_TARGETS, Command as Command, Pages as Pages
 from .passive import RippleViewer as RippleViewer, launch_passive as launch_passive
 from .recorder import Recorder as Recorder
 from .saved_scene import moved_camera as moved_camera, save_scene as save_scene

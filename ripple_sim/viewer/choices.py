@@ -1,13 +1,15 @@
-"""`Choices`: the materials that the user has chosen in the viewer, by target."""
+"""`Choices`: the materials and looks that the user has chosen in the viewer, by target."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.render.visuals.visual import find_look
 from ripple_sim.scene.material_entry import COEFFICIENTS, MaterialEntry
 from ripple_sim.scene.scene_file import RippleEntry
 from ripple_sim.solver import Material
@@ -18,7 +20,7 @@ _MAX_FACTOR = 8.0
 
 
 class Choices:
-    """Real materials in place of a scene's own ones, and factors of the sliders.
+    """Real materials and looks in place of a scene's own ones, and factors of the sliders.
 
     Parameters
     ----------
@@ -29,7 +31,8 @@ class Choices:
     def __init__(self, ripples: Ripples) -> None:
         self._ripples = ripples
         self._own = {name: ripples[name].material for name in ripples}
-        self._presets: dict[str, str] = {}
+        self._presets = dict.fromkeys(ripples, "")
+        self._looks = dict.fromkeys(ripples, "")
         self._factors = dict.fromkeys(_FACTORS, 1.0)
 
     def choose_preset(self, targets: Iterable[str], preset: str) -> None:
@@ -42,6 +45,26 @@ class Choices:
         for target in targets:
             self._presets[target] = preset
         self.apply()
+
+    def choose_look(self, targets: Iterable[str], look: str) -> None:
+        """Give targets a look, or their own again for an empty name.
+
+        Raises `RippleError` for an unknown name.
+        """
+        if look:
+            find_look(look)
+        for target in targets:
+            self._looks[target] = look
+
+    def by_target(self) -> list[dict[str, str]]:
+        """Names of the preset and the look of each target, empty for its own."""
+        return [
+            {"preset": self._presets[name], "look": self._looks[name]} for name in self._presets
+        ]
+
+    def look(self, target: str) -> str:
+        """Name of the look that is chosen for a target, or an empty name."""
+        return self._looks[target]
 
     def choose_factors(self, factors: Mapping[str, float]) -> None:
         """Multiply coefficients of all targets.
@@ -59,7 +82,7 @@ class Choices:
     def apply(self) -> None:
         """Give the targets the materials that are chosen; the waves stay as they are."""
         for target, own in self._own.items():
-            preset = self._presets.get(target)
+            preset = self._presets[target]
             material = Material.preset(preset) if preset else own
             coefficients = dict(vars(material))
             for name, factor in self._factors.items():
@@ -77,13 +100,15 @@ class Choices:
         return any(factor != 1.0 for factor in self._factors.values())
 
     def chosen(self, entry: RippleEntry) -> RippleEntry:
-        """The entry of a target for a scene file with the material that it has now.
+        """The entry of a target for a scene file with the material and look that it has now.
 
         A material that the model chose is written as numbers, since another model chooses another.
 
         Raises `ValueError` if factors are chosen for a material that varies over the surface.
         """
-        preset = self._presets.get(entry.geom)
+        look = self._looks[entry.geom] or entry.look
+        entry = msgspec.structs.replace(entry, look=look)
+        preset = self._presets[entry.geom]
         if preset:
             material = MaterialEntry(preset=preset)
             limits = RippleEntry(entry.geom).thickness_limits
@@ -104,7 +129,7 @@ class Choices:
         return entry
 
 
-def _numbers(material: Material) -> dict[str, float] | None:
+def _numbers(material: Material) -> dict[str, Any] | None:
     """The coefficients of a uniform material that differ from a plain one; None of any other."""
     plain = Material()
     coefficients = {name: np.asarray(getattr(material, name)) for name in COEFFICIENTS}

@@ -25,7 +25,7 @@ from .access import check_port
 from .hand import Hand
 from .opening import display_problem, poke_strength
 from .page_server import PageServer
-from .pages import Command, Pages
+from .pages import Command, Pages, target_of
 
 # Frames a second that the page's clock counts.
 _FPS = 60
@@ -115,17 +115,15 @@ class LoopView:
         return {
             "operators": [],
             "presets": [],
+            "looks": [],
+            "chosen": [{"preset": "", "look": ""} for _ in self._ripples],
+            "commands": list(self._actions),
             "paused": self._is_paused,
             "movable": movable.tolist(),
         }
 
     def _poke(self, command: Command) -> None:
-        names = list(self._ripples)
-        if not 0 <= command.target < len(names):
-            raise ValueError(
-                f"target must be a number from 0 to {len(names) - 1}, got {command.target}"
-            )
-        waves = self._ripples[names[command.target]]
+        waves = self._ripples[target_of(command, list(self._ripples))]
         size = float(np.ptp(waves.rest.mesh.V, axis=0).max())
         radius, impulse = poke_strength(waves.material, size)
         waves.add_impulse(command.point, command.strength * impulse, radius)

@@ -75,6 +75,11 @@ class PageStream:
         for target, law in laws.items():
             self.tell(law={"target": target, "content": law})
 
+    def repaint(self, source: Source, targets: Sequence[str]) -> None:
+        """Send the looks that targets have in a source."""
+        for target, look in self._content.looks(source, targets).items():
+            self.tell(look={"target": target, "content": look})
+
     def tell(self, **message: Any) -> None:
         """Send a message."""
         self.messages.put(json.dumps(message))

@@ -6,6 +6,7 @@ draw.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import time
 from collections.abc import Callable
@@ -20,13 +21,14 @@ from ripple_sim.export.exporter import Exporter, scene_source
 from ripple_sim.export.options import ExportOptions
 from ripple_sim.export.renderer import RippleRenderer
 from ripple_sim.export.source import Source
+from ripple_sim.render.visuals.visual import LOOKS
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.operator.presets import PRESETS
 
 from .choices import Choices
 from .hand import Hand
 from .opening import Opened
-from .pages import Command, Pages
+from .pages import ALL_TARGETS, Command, Pages, target_of
 from .recorder import Recorder
 from .saved_scene import moved_camera, save_scene
 from .session import OPERATORS, Session
@@ -68,6 +70,7 @@ class PageView:
         self.closed = False
         self.pages = Pages(source, simulation.data, self._menu)
         self._source = source
+        self._paints = source.paints  # the scene's own
         self._origin = origin
         self._hand = Hand(simulation.model)
         self._recorder = Recorder(self.folder, simulation.scene.name, session.fps)
@@ -85,6 +88,7 @@ class PageView:
             "reset": self._reset,
             "operator": self._change_operator,
             "preset": self._change_preset,
+            "look": self._change_look,
             "factors": self._change_factors,
             "record": self._record,
             "share": self._share,
@@ -116,6 +120,9 @@ class PageView:
         self.closed = True
         self.pages.end()
         self._recorder.stop()
+        self._close_renderer()
+
+    def _close_renderer(self) -> None:
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
@@ -126,6 +133,9 @@ class PageView:
         return {
             "operators": OPERATORS,
             "presets": list(PRESETS),
+            "looks": list(LOOKS),
+            "chosen": self._choices.by_target(),
+            "commands": list(self._actions),
             "paused": self.session.paused,
             "movable": movable.tolist(),
         }
@@ -144,14 +154,10 @@ class PageView:
 
     def _poke(self, command: Command) -> None:
         ripples = self.session.simulation.ripples
-        names = list(ripples)
-        if not 0 <= command.target < len(names):
-            raise ValueError(
-                f"target must be a number from 0 to {len(names) - 1}, got {command.target}"
-            )
+        name = target_of(command, list(ripples))
         radius = self.session.poke_radius
         impulse = command.strength * self.session.poke_impulse
-        ripples[names[command.target]].add_impulse(command.point, impulse, radius)
+        ripples[name].add_impulse(command.point, impulse, radius)
 
     def _throw(self, command: Command) -> None:
         if not self.session.throw(command.point, command.way):
@@ -186,9 +192,28 @@ class PageView:
         self.pages.send([])
 
     def _change_preset(self, command: Command) -> None:
-        """Give all surfaces a real material, or their own again for an empty name."""
-        self._choices.choose_preset(self.session.simulation.ripples, command.name)
+        """Give targets a real material, or their own again for an empty name."""
+        self._choices.choose_preset(self._targets(command), command.name)
         self.pages.send([])
+        self.pages.tell(chosen=self._choices.by_target())
+
+    def _change_look(self, command: Command) -> None:
+        """Give targets a look, or their own again for an empty name."""
+        targets = self._targets(command)
+        self._choices.choose_look(targets, command.name)
+        paints = dict(self._source.paints)
+        for name in targets:
+            own, color = self._paints[name]
+            paints[name] = (self._choices.look(name) or own, color)
+        self._source = dataclasses.replace(self._source, paints=paints)
+        self.pages.repaint(self._source, targets)
+        self.pages.tell(chosen=self._choices.by_target())
+        self._close_renderer()  # the next picture has one with these looks
+
+    def _targets(self, command: Command) -> list[str]:
+        """The targets that a command means: one, or all."""
+        names = list(self.session.simulation.ripples)
+        return names if command.target == ALL_TARGETS else [target_of(command, names)]
 
     def _change_factors(self, command: Command) -> None:
         """Multiply coefficients of the materials that are chosen."""

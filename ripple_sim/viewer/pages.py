@@ -20,6 +20,9 @@ from .page_stream import PageStream
 # A page that does not open its socket for this long is forgotten [s].
 _OPENING_TIME = 20.0
 
+# Number of a command's target that means all of them.
+ALL_TARGETS = -1
+
 Point = tuple[float, float, float]
 
 
@@ -35,6 +38,18 @@ class Command(msgspec.Struct, forbid_unknown_fields=True):
     name: str = ""
     factors: dict[str, float] = {}
     camera: dict[str, Any] = {}
+
+
+def target_of(command: Command, names: Sequence[str]) -> str:
+    """Name of the target that a command means.
+
+    Raises `ValueError` if there is no target of its number.
+    """
+    if not 0 <= command.target < len(names):
+        raise ValueError(
+            f"target must be a number from 0 to {len(names) - 1}, got {command.target}"
+        )
+    return names[command.target]
 
 
 class Pages:
@@ -127,6 +142,12 @@ class Pages:
         """Send the present state as a frame, with the impulses since the last one."""
         for stream, _ in self._streams.values():
             stream.add(self._data, impulses)
+
+    def repaint(self, source: Source, targets: Sequence[str]) -> None:
+        """Show targets with the looks of a source from now on."""
+        self._source = source
+        for stream, _ in self._streams.values():
+            stream.repaint(source, targets)
 
     def tell(self, **message: Any) -> None:
         """Send all pages a message."""

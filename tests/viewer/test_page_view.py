@@ -1,5 +1,7 @@
 """The viewer's page in a headless browser: its waves are those of the program, and it drives it."""
 
+import json
+import re
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,7 +16,16 @@ from pages import opened
 import ripple_sim
 from ripple_sim import Material, Ripples
 from ripple_sim.scene import MaterialEntry, Scene, load_scene
-from ripple_sim.viewer import Opened, PageView, Session, served, view_of
+from ripple_sim.viewer import (
+    ALL_TARGETS,
+    Command,
+    Opened,
+    PageView,
+    Session,
+    open_scene,
+    served,
+    view_of,
+)
 
 SIZE = (320, 180)
 
@@ -198,6 +209,8 @@ def test_a_saved_scene_shows_what_the_page_shows(page: Page) -> None:
     assert saved.targets == origin.targets
     assert saved.camera == origin.camera
     page.tab.select_option("#preset", "gelatine-5")
+    page.tab.select_option("#look", "metal")
+    page.wait_until("ripplePlayer.player.targets[0].metallic === 1")
     page.tab.mouse.move(20, 20)
     page.tab.mouse.down()
     page.tab.mouse.move(60, 20)
@@ -206,9 +219,27 @@ def test_a_saved_scene_shows_what_the_page_shows(page: Page) -> None:
     page.wait_for(lambda: (page.view.folder / "sphere-2.toml").exists())
     saved = load_scene(page.view.folder / "sphere-2.toml")
     assert saved.targets[0].material == MaterialEntry(preset="gelatine-5")
+    assert saved.targets[0].look == "metal"
     turned = np.degrees(page.tab.evaluate("ripplePlayer.player.orbit.azimuth"))  # of the eye
     assert (saved.camera.azimuth - turned) % 360 == pytest.approx(180, abs=0.06)
     assert saved.camera.azimuth != origin.camera.azimuth
+
+
+def test_materials_and_looks_are_chosen_by_target(tmp_path: Path) -> None:
+    view = view_of(Session(open_scene("pair"), resolution=9, has_skins=False), tmp_path, 8)
+    with pytest.raises(ValueError, match="from 0 to 1, got 2"):
+        view._change_look(Command("look", target=2, name="metal"))
+    view._change_look(Command("look", target=1, name="metal"))
+    view._change_preset(Command("preset", target=0, name="gelatine-3"))
+    parts = json.loads(re.search(r'id="meta">(.*)</script>', view.pages.open().text)[1])["parts"]
+    assert [part["metallic"] for part in parts if part["target"]] == [0, 1]
+    ripples = view.session.simulation.ripples
+    left, right = (ripples[name].material for name in ripples)
+    assert left.density == Material.preset("gelatine-3").density != right.density
+    view._change_look(Command("look", target=ALL_TARGETS, name=""))
+    parts = json.loads(re.search(r'id="meta">(.*)</script>', view.pages.open().text)[1])["parts"]
+    assert [part["metallic"] for part in parts if part["target"]] == [0, 0]
+    view.close()
 
 
 def test_a_loop_of_ones_own_is_shown_and_poked(browser: Any, scene: Scene) -> None:

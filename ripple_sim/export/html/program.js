@@ -15,17 +15,51 @@ function programControls(player, ui) {
   of("program").hidden = false;
   of("clock").hidden = true;
   for (const name of stream.operators) of("operator").add(new Option(name, name));
-  for (const name of stream.presets) of("preset").add(new Option(name, name));
+  choiceControls(player, ui);
   of("operator").onchange = () => player.send("operator", {name: of("operator").value});
-  of("preset").onchange = () => player.send("preset", {name: of("preset").value});
   of("throw").onclick = () => throwBall(player, ui);
   of("record").onclick = () => player.send("record", {camera: cameraEntry(player)});
   of("share").onclick = () => player.send("share");
   of("save").onclick = () => player.send("save", {camera: movedCamera(player)});
   of("copy").onclick = () => copyCamera(player, ui);
   of("quit").onclick = () => player.send("quit");
+  hideWhatIsNot(stream.commands, of);
   connect(player, ui);
   ui.paused(stream.paused);
+}
+
+// Materials and looks, of one target or of all.
+function choiceControls(player, ui) {
+  const {of} = ui, {stream} = player.meta;
+  let choices = stream.chosen;
+  player.targets.forEach(({name}, number) => of("target").add(new Option(name, number)));
+  of("target").parentElement.hidden = choices.length < 2;
+  const show = () => {
+    const number = Number(of("target").value), shown = number < 0 ? choices : [choices[number]];
+    for (const kind of ["preset", "look"]) {
+      const names = new Set(shown.map(choice => choice[kind]));
+      of(kind).value = names.size === 1 ? shown[0][kind] : "";
+    }
+  };
+  for (const kind of ["preset", "look"]) {
+    for (const name of stream[`${kind}s`]) of(kind).add(new Option(name, name));
+    of(kind).onchange = () => {
+      player.send(kind, {name: of(kind).value, target: Number(of("target").value)});
+    };
+  }
+  of("target").onchange = show;
+  ui.chosen = chosen => { choices = chosen; show(); };
+  show();
+}
+
+// A program that shows a loop of the user's own does less than the viewer.
+function hideWhatIsNot(commands, of) {
+  for (const id of ["throw", "record", "share", "save", "quit"]) of(id).hidden = !commands.includes(id);
+  for (const id of ["preset", "look", "operator"]) of(id).parentElement.hidden = !commands.includes(id);
+  for (const id of ["wave-speed", "damping", "stiffness", "plain"]) {
+    const control = of(id).closest("label") || of(id);
+    control.hidden = !commands.includes("factors");
+  }
 }
 
 // A ball from the camera at the pointer.

@@ -45,6 +45,11 @@ async function heard(player, ui, message) {
   if (message.say) ui.say(message.say);
   if ("paused" in message) ui.paused(message.paused);
   if (message.reset) { player.timeline.forgetAll(); player.following = true; }
+  if (message.chosen) ui.chosen(message.chosen);
+  if (message.look) {
+    Object.assign(player.targets[message.look.target], message.look.content);
+    player.redraw();
+  }
   if (message.motion) {
     const script = document.createElement("script");
     Object.assign(script, {type: "application/json", className: "motion", textContent: JSON.stringify(message.motion.content)});
