@@ -518,6 +518,7 @@ class Ripples:
             self._waves[target].move(surface.vertices(solved))
         self._step_waves(data, solved, passed.elapsed, pending=unsolved is not None)
         self._sensor_data.write(data)
+        self._warn_once("sensors", self._sensor_data.timestep_warning())
         self._check_amplitude()
 
     def _step_waves(

@@ -92,6 +92,7 @@ class SensorData:
     def __init__(self, model: mujoco.MjModel, waves: Mapping[TargetId, TargetWaves]) -> None:
         self._model = model
         self._waves = waves
+        self._timestep = float(model.opt.timestep)
         self.sensors: dict[str, Sensor] = {}
         # with their place in `sensordata`
         self._blocks: list[tuple[slice, SampleBlocks]] = []
@@ -113,6 +114,18 @@ class SensorData:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return SensorData, (self._model, self._waves)
+
+    def timestep_warning(self) -> str | None:
+        """Warning of a time step that the sensors' blocks do not fit; None if they fit."""
+        timestep = float(self._model.opt.timestep)
+        if not self.sensors or timestep == self._timestep:
+            return None
+        lost = "lack samples" if timestep > self._timestep else "repeat samples"
+        return (
+            f"the model's time step was changed from {self._timestep:g} to {timestep:g} s: sensors "
+            f"of add_sensor have room for the samples of {self._timestep:g} s, and their blocks in "
+            f"sensordata {lost} from now on; set spec.option.timestep before add_sensor"
+        )
 
     def write(self, data: mujoco.MjData) -> None:
         """Write the samples of the latest step."""

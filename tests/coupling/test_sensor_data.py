@@ -19,6 +19,9 @@ MODEL = f"""<mujoco><option timestep="{DT}"/><worldbody>
 <geom name="bell" type="sphere" size="0.1"/><site name="side" pos="0.1 0 0"/>
 <body pos="0 0 0.122"><freejoint/><geom name="ball" size="0.02" mass="0.01"/><site name="off"/>
 </body></worldbody></mujoco>"""
+FLEX = f"""<mujoco><option timestep="{DT}"/><worldbody><site name="middle"/>
+<flexcomp name="sheet" type="grid" dim="2" count="5 5 1" spacing="0.05 0.05 0.05" radius="0.002"
+  mass="0.1" rigid="true"/></worldbody></mujoco>"""
 MATERIAL = {"bell": Material(speed=20.0, damping=10.0, density=2.0)}
 
 
@@ -86,6 +89,32 @@ def test_a_missed_step_moves_no_later_sample() -> None:
     end = 42 * SAMPLES - math.ceil(alone.latency * RATE)
     np.testing.assert_array_equal(samples, alone.read().values[end - len(samples) : end, 0])
     assert samples.any()
+
+
+def test_a_changed_time_step_is_told_of_once_and_blocks_end_at_the_latest_sample() -> None:
+    model = specification().compile()
+    data = mujoco.MjData(model)
+    ripples = rippling(model)
+    alone = ripples["bell"].sensor("side", rate=RATE)
+    row(ripples, data, steps=40)
+    model.opt.timestep = 2 * DT
+    with pytest.warns(RippleWarning, match=r"from 0\.002 to 0\.004 s: .* lack samples") as record:
+        block = row(ripples, data, steps=2)[-SAMPLES:]
+    assert len(record) == 1
+    end = 44 * SAMPLES - math.ceil(alone.latency * RATE)
+    np.testing.assert_array_equal(block, alone.read().values[end - SAMPLES : end, 0])
+    assert block.any()
+
+
+def test_a_flex_has_sensors() -> None:
+    spec = mujoco.MjSpec.from_string(FLEX)
+    add_sensor(spec, "middle", geom="sheet", site="middle", kind="velocity", rate=RATE)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    ripples = rippling(model, "sheet")
+    assert np.linalg.norm(ripples.sensors["middle"].points[0]) < 0.01
+    ripples.poke("sheet", [0, 0, 0], 1e-4)
+    assert row(ripples, data, "middle", steps=30).any()
 
 
 def test_sensors_survive_xml_and_attach() -> None:
