@@ -94,9 +94,12 @@ def add_sensor(
     site : str
         Name of a site on the geom's body, or on one welded to it; the nearest point of the surface
         is taken.
-    kind, rate, thickness
-        As for `WaveSolver.sensor`. The rate [1/s] must give a whole number of samples in a time
-        step.
+    kind : str
+        As for `WaveSolver.sensor`.
+    rate : float
+        Samples a second [1/s]; a whole number of samples in a time step.
+    thickness : float, optional
+        As for `WaveSolver.sensor` [m].
 
     Returns
     -------

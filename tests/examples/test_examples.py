@@ -26,7 +26,7 @@ FILES = sorted(each.relative_to(EXAMPLES).as_posix() for each in EXAMPLES.rglob(
 SMALL: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "step_hook.py": ({}, {"duration": 1 / 60}, "1 frames in"),
     "compare_operators.py": ({"SIZE": 60, "RESOLUTION": 16}, {}, "out/compare_operators.png"),
-    "gymnasium_felt_bell.py": ({}, {}, "step 11: "),
+    "gymnasium_feeling_foot.py": ({}, {}, "step 19: "),
     "gymnasium_tapped_place.py": ({"DROPS": 48}, {}, "100% of 16 taps"),
     "sphere_on_film.py": ({"STEP": 4e-5, "RESOLUTIONS": (16,)}, {}, "greatest depth 0."),
     "benchmarks/finite_guard.py": ({"TIMES": 3}, {}, "| 256 |"),
