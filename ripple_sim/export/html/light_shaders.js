@@ -48,9 +48,10 @@ const incident = (i, near) => `vec3 incident${i}(vec3 p, out vec3 way) {
   return lampRadiance[${i}];
 }`;
 
+const SPREAD = 1.8;  // between samples of the shadow map, each of which is linear between texels [texels]
 // The mean of the shadow map's samples round a point.
 function samples(taps, size) {
-  const along = Array.from({length: taps}, (_, i) => ((i - 0.5 * (taps - 1)) / size).toFixed(9));
+  const along = Array.from({length: taps}, (_, i) => (SPREAD * (i - 0.5 * (taps - 1)) / size).toFixed(9));
   const all = along.flatMap(x => along.map(y => `texture(shadowMap, vec3(c.x + ${x}, c.y + ${y}, c.z))`));
   return `(${all.join(" + ")}) / ${all.length.toFixed(1)}`;
 }
