@@ -33,8 +33,8 @@ def make(folder: Path) -> Part:
             (
                 file,
                 (
-                    f"{method.capitalize()}: blue texels are finer than an even spread, red ones "
-                    f"coarser."
+                    f"{method.capitalize()}: blue texels are smaller than in an even spread, red "
+                    "texels larger."
                 ),
             )
         )
@@ -49,9 +49,9 @@ def make(folder: Path) -> Part:
         )
     return Part(
         "Figure 2: an object and its sphere map",
-        "A conformal map preserves angles but leaves the legs almost no area on the sphere: they "
-        "get few texels, "
-        "and waves die there. The progressive map spreads the texels evenly, without folds.",
+        "A conformal map preserves angles but gives the legs almost no area on the sphere. They "
+        "get few texels, and waves die there. The progressive map spreads the texels evenly, "
+        "without folds.",
         pictures,
         rows,
     )

@@ -30,8 +30,8 @@ def make(folder: Path) -> Part:
     return Part(
         "Figure 5: a complex mesh",
         (
-            f"{len(mesh.F):,} triangles; sphere map and atlas of 6 x 128 x 128 texels took "
-            f"{seconds:.2f} s."
+            f"The duck has {len(mesh.F):,} triangles. Its sphere map and its atlas of "
+            f"6 x 128 x 128 texels took {seconds:.2f} s."
         ),
         [(file, "Bodies rain on a jelly duck, after 1, 2 and 3 s.")],
     )

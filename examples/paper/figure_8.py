@@ -48,7 +48,7 @@ def make(folder: Path) -> Part:
     return Part(
         "Figure 8: speed and damping from a texture",
         "An image in the object's own texture coordinates is sampled once per texel. "
-        "Waves travel slower, or decay faster, on one half.",
+        "On one half of the head, waves are slower or decay faster.",
         pictures,
     )
 

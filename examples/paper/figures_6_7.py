@@ -67,12 +67,10 @@ def make(folder: Path) -> Part:
         rows.append([operator, *figures, f"{seconds:.2f} s"])
     return Part(
         "Figures 6 and 7: corrected and uncorrected",
-        "A ring that starts on the back should stay a circle along the surface. Without real-space "
-        "distances it "
-        "follows the texels; with the paper's formula its speed still depends on the shape of the "
-        "texels; with finite "
-        "elements on the texels it does not. The correction is part of the set-up; all steps cost "
-        "the same.",
+        "A ring starts on the back and should stay a geodesic circle. Without real-space "
+        "distances the ring follows the texels. With the paper's formula its speed still depends "
+        "on the shape of the texels. With finite elements on the texels it does not. The "
+        "correction is computed at set-up, so that a step costs the same with each operator.",
         pictures,
         rows,
     )

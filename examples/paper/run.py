@@ -27,9 +27,9 @@ PARTS = (
 )
 TITLE = "The paper, part by part"
 LEAD = (
-    'The figures of Kira, Nakayama and Fujishiro, "Jacobian-free Deformation of Genus-0 Surfaces", '
-    "with other "
-    "objects, drawn and measured by one command: `python examples/paper/run.py`."
+    "This page repeats the figures of Kira, Nakayama and Fujishiro, "
+    '"Jacobian-free Deformation of Genus-0 Surfaces", with other objects. '
+    "`python examples/paper/run.py` draws and measures all of them."
 )
 
 

@@ -20,10 +20,10 @@ def make(folder: Path) -> Part:
     return Part(
         "Section 4.1: stop, reset and turn while it runs",
         (
-            "A page solves the waves in the browser: click, touch or drag on the object to poke "
-            "it, drag beside it to turn the camera. Speed, damping and stiffness of the waves "
-            "change while it runs. "
-            f"{OPTIONS.duration:g} s at N = {OPTIONS.resolution} are one file of "
+            "An exported page solves the waves in the browser. Click, touch or drag on the object "
+            "to poke it, and drag beside it to turn the camera. You can change the speed, damping "
+            "and stiffness of the waves while it runs. "
+            f"A page of {OPTIONS.duration:g} s at N = {OPTIONS.resolution} is one file of "
             f"{megabytes:.1f} MB."
         ),
         live=SCENE,

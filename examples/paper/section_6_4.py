@@ -117,11 +117,9 @@ def make(folder: Path, mesh: Path = PRETZEL) -> Part:
             rows.append(row(path.stem, build_atlas(load_mesh(path), RESOLUTION)))
     return Part(
         "Section 6.4: surfaces with handles",
-        "A surface with handles has no map onto the sphere, and so no cube. Here it is laid out on "
-        "as many small "
-        "square charts as it needs, and the same operator runs on their texels: rings go round "
-        "each handle and meet "
-        "on its far side.",
+        "A surface with handles cannot be mapped onto a sphere, nor onto the faces of a cube. "
+        "The patch layout covers it with as many small square charts as it needs, and the same "
+        "operator runs on their texels. Rings go round each handle and meet on its far side.",
         pictures,
         rows,
     )

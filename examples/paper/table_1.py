@@ -68,11 +68,10 @@ def make(folder: Path) -> Part:
         )
     return Part(
         "Table 1: steps per second, and the precomputation",
-        "Wave steps per second on the CPU, without rendering. The polygons matter in the "
-        "precomputation only: the "
-        f"waves run on texels. The paper gives {PAPER['seconds']} s for casting the rays of "
-        f"{PAPER['texels']} texels "
-        f"against each of {PAPER['polygons']} polygons; an atlas of N = 56 has 18,816 texels.",
+        "The table lists wave steps per second on the CPU, without rendering. The number of "
+        "polygons matters in the precomputation only, since the waves run on texels. The paper "
+        f"needs {PAPER['seconds']} s to cast the rays of {PAPER['texels']} texels against each of "
+        f"{PAPER['polygons']} polygons. An atlas of N = 56 has 18,816 texels.",
         table=rows,
     )
 
