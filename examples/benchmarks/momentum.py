@@ -156,11 +156,13 @@ def measure(case: Case) -> tuple[float, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cases", nargs="*", default=list(CASES), metavar="CASE")
-    print("| case | the plate gains [N s] | its surface receives | error |")
+    print("| how bodies push the plate | momentum of the plate [N s] | ", end="")
+    print("impulse on its surface [N s] | error [%] |")
     print("| --- | --- | --- | --- |")
     for name in parser.parse_args().cases:
         gained, given = measure(CASES[name])
-        print(f"| {name} | {gained:.4f} | {given:.4f} | {abs(given / gained - 1):.2%} |")
+        error = 100 * abs(given / gained - 1)
+        print(f"| {name} | {gained:.4f} | {given:.4f} | {error:.2f} |")
 
 
 if __name__ == "__main__":
