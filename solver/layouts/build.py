@@ -110,7 +110,8 @@ def build_atlas(
         From `load_mesh` or `Mesh.from_arrays`.
     resolution : int
         Texels along the side of a chart of the cube layout, N. The cube layout has 6 N^2 texels,
-        and the patch layout about as many, or more if charts would have less than 4 x 4.
+        and the patch layout about as many, or up to three times as many if charts would have less
+        than 4 x 4; more only if charts of 2 x 2 still have more.
     method : str
         Sphere map of the cube layout: "progressive" (fold-free, spreads area evenly) or "conformal"
         (keeps angles but starves limbs; the choice of the paper).

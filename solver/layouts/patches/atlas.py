@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 import time
 
 import numpy as np
@@ -26,14 +27,18 @@ from ...texels.topology import TexelTopology
 from ..energy import COLUMN, FIXED
 from .disks import signed_areas
 from .layout import PatchMap, Report, patch_map, tell_nobody
+from .parts import MIN_SIDE
 from .pieces import Pieces, chart_pieces, warped
 from .quads import CELLS
 from .samples import Samples, centres, on_mesh, untangled
 from .seamless import Complex, SeamlessMap, follow, places_seen_from
 from .still import still_pieces, still_texels
 
-# Texels along the side of a chart, at least.
-_MIN_CHART_TEXELS = 4
+# Texels along the side of a chart, at least, unless an atlas would have too many texels.
+_USUAL_MIN_SIDE = 4
+
+# Too many texels: so many times as many as were asked for.
+_MAX_TEXEL_FACTOR = 3
 
 # Texels of a cell that is worth having: five charts of 7 x 7. A coarse atlas has fewer cells.
 _TEXELS_PER_CELL = 245
@@ -287,10 +292,18 @@ def cells_for(resolution: int) -> int:
     return int(np.clip(6 * resolution**2 / _TEXELS_PER_CELL, _MIN_CELLS, CELLS))
 
 
+def chart_side(charts: int, resolution: int) -> int:
+    """Texels along the side of each chart of an atlas."""
+    asked = 6 * resolution**2
+    side = round(float(np.sqrt(asked / charts)))
+    most = math.isqrt(_MAX_TEXEL_FACTOR * asked // charts)
+    return max(side, min(_USUAL_MIN_SIDE, most), MIN_SIDE)
+
+
 def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atlas:
     """Put texels on a mesh that is laid out on charts."""
     glued = patches.seamless.glued
-    n = max(round(resolution * np.sqrt(6 / len(glued))), _MIN_CHART_TEXELS)
+    n = chart_side(len(glued), resolution)
     samples = centres(mesh, patches, n)
     topology = glue(glued, n)
     beyond = positions_beyond(patches, topology, samples.positions)

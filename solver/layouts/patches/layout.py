@@ -22,7 +22,17 @@ from ...mesh.topology import triangle_areas
 from ..energy import FIXED, FREE, Density, Reference, star_energy
 from .collapse import without_cuts
 from .energy import Star, energy_of, gather, reference_of, relax_all, scratch, sweep, sweep_all
-from .parts import MAX_PARTS, Part, Parts, models_of, parts_of, transferred
+from .parts import (
+    MAX_PARTS,
+    MAX_STILL_SHARE,
+    MIN_SIDE,
+    MIN_TEXELS,
+    Part,
+    Parts,
+    models_of,
+    parts_of,
+    transferred,
+)
 from .quads import CELLS, Quads, large_quads_of, quads_of
 from .seamless import (
     Frame,
@@ -59,6 +69,17 @@ _NEGLIGIBLE_AREA = 2e-3
 
 # A part is cut again if its number of charts is off its share by this share of it.
 _MAX_CHART_ERROR = 0.1
+
+# Charts over cells from which on handles and loose parts decide on the number of charts, and not
+# the number of cells.
+_MAX_CHARTS_PER_CELL = 4
+
+# There a part is cut again only if its number of charts is off by this share of it: cutting takes
+# long, and gives about as many charts.
+_MAX_CHART_ERROR_OF_MANY = 0.5
+
+# Texels on a part over the texels in its area, at most: they are half as wide as elsewhere.
+_MAX_CROWDING = 4
 
 # Times that a part is cut again, at most.
 _MAX_RECUTS = 3
@@ -366,9 +387,9 @@ def patch_map(
     parts = parts_of(V, F, texels)
     counts = _cell_counts(np.array([part.share for part in parts.waving]), cells)
     models = models_of(parts.waving, counts)
-    quads, failures = _quads_of_parts(parts.waving, counts, models, report)
+    quads, failures = _quads_of_parts(parts.waving, counts, models, texels, report)
     notes = _still_notes(V, F, parts, texels)
-    notes += [_failure_note(V, F, parts.waving[i], error) for i, error in failures.items()]
+    notes += _failure_notes(V, F, parts.waving, failures)
     still = [*parts.crumbs, *parts.surplus, *(parts.waving[i].faces for i in failures)]
     chart_count = sum(len(quads[models[i]].glued) for i in range(len(models)) if i not in failures)
     area = sum(part.share for i, part in enumerate(parts.waving) if i not in failures)
@@ -392,7 +413,11 @@ def patch_map(
 
 
 def _quads_of_parts(
-    parts: list[Part], counts: list[int], models: list[int], report: Report
+    parts: list[Part],
+    counts: list[int],
+    models: list[int],
+    texels: int | None,
+    report: Report,
 ) -> tuple[dict[int, Quads], dict[int, AtlasError]]:
     """The quads of each model, and why parts have none.
 
@@ -416,14 +441,37 @@ def _quads_of_parts(
     if not quads:
         raise errors[largest]
     failures = {i: errors[model] for i, model in enumerate(models) if model in errors}
-    chart_count = sum(len(quads[model].glued) for model in models if model in quads)
-    wanted = shares / shares[[model in quads for model in models]].sum() * chart_count
-    if len(parts) > 1:
-        for i in quads:
+    charts = np.array([len(quads[model].glued) if model in quads else 0 for model in models])
+    if texels is not None:
+        failures |= _crowded(charts, shares, texels)
+    carried = [i for i in range(len(parts)) if i not in failures]
+    chart_count = int(charts[carried].sum())
+    wanted = shares / shares[carried].sum() * chart_count
+    are_many = chart_count > _MAX_CHARTS_PER_CELL * sum(counts)
+    tolerance = _MAX_CHART_ERROR_OF_MANY if are_many else _MAX_CHART_ERROR
+    if len(carried) > 1:
+        for i in sorted(quads.keys() - failures.keys()):
             if shares[i] > _NEGLIGIBLE_AREA:
                 report(f"cutting part {i + 1} of {len(parts)} again")
-                quads[i] = _recut(parts[i].surface, counts[i], large, quads[i], float(wanted[i]))
+                quads[i] = _recut(
+                    parts[i].surface, counts[i], large, quads[i], float(wanted[i]), tolerance
+                )
     return quads, failures
+
+
+def _crowded(charts: Ints, shares: Floats, texels: int) -> dict[int, AtlasError]:
+    """Why parts with a number of charts and a share of the area lie still: texels would be tiny.
+
+    They are the most crowded ones. Crumbs and they have little of the area together.
+    """
+    crowding = charts * MIN_SIDE**2 / (shares * texels)
+    # the largest part that has charts carries waves in any case
+    crowding[np.where(charts > 0, shares, 0.0).argmax()] = 0.0
+    order = np.argsort(-crowding, kind="stable")
+    crumbs_share = 1 - shares.sum()
+    order = order[crumbs_share + np.cumsum(shares[order]) <= MAX_STILL_SHARE]
+    error = AtlasError("texels would be less than half as wide as elsewhere")
+    return dict.fromkeys(order[crowding[order] > _MAX_CROWDING].tolist(), error)
 
 
 def _still_notes(V: Floats, F: Ints, parts: Parts, texels: int | None) -> list[str]:
@@ -433,8 +481,8 @@ def _still_notes(V: Floats, F: Ints, parts: Parts, texels: int | None) -> list[s
     if parts.crumbs:
         width = np.sqrt(triangle_areas(V, F).sum() / (texels or 1))  # [m]
         notes.append(
-            f"{len(parts.crumbs):,} of {counted(total, 'part')} lie still: smaller than a texel "
-            f"({width:.3g} m)"
+            f"{len(parts.crumbs):,} of {counted(total, 'part')} lie still: each smaller than "
+            f"{MIN_TEXELS} texels of {width:.3g} m"
         )
     if parts.surplus:
         notes.append(
@@ -444,10 +492,23 @@ def _still_notes(V: Floats, F: Ints, parts: Parts, texels: int | None) -> list[s
     return notes
 
 
-def _failure_note(V: Floats, F: Ints, part: Part, error: AtlasError) -> str:
-    """A note on a part that lies still since it cannot be laid out."""
-    near = place(V[F[part.faces]].reshape(-1, 3).mean(axis=0))
-    return f"a part of {counted(len(part.faces), 'triangle')} near {near} lies still: {error}"
+def _failure_notes(
+    V: Floats, F: Ints, parts: list[Part], failures: dict[int, AtlasError]
+) -> list[str]:
+    """Notes on the parts that lie still since they cannot be laid out, one for each reason."""
+    parts_by_reason: dict[str, list[Part]] = {}
+    for i, error in failures.items():
+        parts_by_reason.setdefault(str(error), []).append(parts[i])
+    notes = []
+    for reason, alike in parts_by_reason.items():
+        faces = alike[0].faces
+        near = place(V[F[faces]].reshape(-1, 3).mean(axis=0))
+        which = f"a part of {counted(len(faces), 'triangle')} near {near} lies still"
+        if len(alike) > 1:
+            do = "does" if len(alike) == 2 else "do"
+            which = f"{which}, and so {do} {len(alike) - 1:,} more"
+        notes.append(f"{which}: {reason}")
+    return notes
 
 
 def _relaxed(quads: Quads, charts: float) -> tuple[TriangleSurface, SeamlessMap]:
@@ -458,12 +519,18 @@ def _relaxed(quads: Quads, charts: float) -> tuple[TriangleSurface, SeamlessMap]
 
 
 def _recut(
-    part: TriangleSurface, count: int, large: bool, quads: Quads, wanted_charts: float
+    part: TriangleSurface,
+    count: int,
+    large: bool,
+    quads: Quads,
+    wanted_charts: float,
+    tolerance: float,
 ) -> Quads:
     """Cut a part again with other numbers of cells, until it has about the wanted number of charts.
 
     Cells are mended until they are disks with corners enough, which changes their number. `quads`
-    come from `count` cells. The best of all tries is returned.
+    come from `count` cells. A number off by the share `tolerance` will do. The best of all tries is
+    returned.
     """
 
     def error(candidate: Quads) -> float:
@@ -475,7 +542,7 @@ def _recut(
         charts = len(latest.glued)
         previous_count = count
         count = max(1, round(count * float(np.sqrt(wanted_charts / charts))))
-        if abs(charts / wanted_charts - 1) < _MAX_CHART_ERROR or count == previous_count:
+        if abs(charts / wanted_charts - 1) < tolerance or count == previous_count:
             break
         try:
             latest = quads_of(part, count, large)

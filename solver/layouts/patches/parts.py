@@ -1,8 +1,8 @@
 """The connected parts of a mesh: which of them carry waves, and which have the same shape.
 
-A part smaller than a texel shows no wave, and charts for thousands of crumbs would take minutes.
-Such parts lie still. Parts of the same shape, such as the screws of a machine, are cut into charts
-once.
+A part smaller than a few texels shows no wave, charts for thousands of crumbs would take minutes,
+and the tiny texels on them would shorten the time step of all. Such parts lie still. Parts of the
+same shape, such as the screws of a machine, are cut into charts once.
 """
 
 from __future__ import annotations
@@ -11,12 +11,24 @@ import dataclasses
 
 import numpy as np
 
-from ...kernel import Floats, Ints
+from ...kernel import Bools, Floats, Ints
 from ...mesh.topology import labels, triangle_areas
 from .surface import TriangleSurface
 
 # Parts that carry waves, at most: the largest ones. Each has charts of its own.
 MAX_PARTS = 1000
+
+# Texels along the side of a chart, at least, in an atlas that would have too many otherwise. For
+# the same number of texels, eigenvalues on charts of 2 x 2 are as exact as on larger ones.
+MIN_SIDE = 2
+
+# Texels in the area of a part, at least, or it is a crumb. A closed part has 12 charts of 2 x 2
+# texels or more: on a crumb, texels would be less than half as wide as elsewhere.
+MIN_TEXELS = 12
+
+# Share of the area of a mesh that all its crumbs have together, at most, unless they are smaller
+# than a texel each. A heap of small parts still carries waves.
+MAX_STILL_SHARE = 0.05
 
 # Difference between the lengths of sides of two parts of the same shape, at most, in units of the
 # longest side: above the round-off of a file in float32.
@@ -51,7 +63,7 @@ class Parts:
     waving : list of Part
         Those that carry waves, in the order of their first triangles.
     crumbs : list of int64 [m]
-        The triangles of each part that lies still since it is smaller than a texel.
+        The triangles of each part that lies still since it is smaller than a few texels.
     surplus : list of int64 [m]
         The triangles of each part that lies still since there are so many larger ones.
     """
@@ -64,20 +76,20 @@ class Parts:
 def parts_of(V: Floats, F: Ints, texels: int | None = None) -> Parts:
     """The connected components of the mesh V [n, 3] [m], F [m, 3].
 
-    Of a mesh with a number of texels, parts smaller than a texel are crumbs, and the others beyond
-    the largest thousand are surplus; without a number there are none of either. The largest part
-    carries waves in any case.
+    Of a mesh with a number of texels, parts smaller than a few texels are crumbs, and the others
+    beyond the largest thousand are surplus; without a number there are none of either. The largest
+    part carries waves in any case.
     """
     edges = np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2)
     part_of = np.unique(labels(edges, len(V))[F[:, 0]], return_inverse=True)[1]
     areas = triangle_areas(V, F)
-    shares = np.bincount(part_of, areas / areas.sum())
+    shares = np.bincount(part_of, areas / areas.sum()).astype(np.float64)
     order = np.argsort(part_of, kind="stable")
     faces_of_parts = np.split(order, np.cumsum(np.bincount(part_of))[:-1])
     is_crumb = np.zeros(len(shares), bool)
     is_surplus = np.zeros(len(shares), bool)
     if texels is not None:
-        is_crumb = shares < 1 / texels
+        is_crumb = (shares < 1 / texels) | smallest(shares, MIN_TEXELS / texels)
         is_crumb[shares.argmax()] = False
         is_surplus[np.argsort(-shares, kind="stable")[MAX_PARTS:]] = True
         is_surplus &= ~is_crumb
@@ -90,6 +102,14 @@ def parts_of(V: Floats, F: Ints, texels: int | None = None) -> Parts:
     crumbs = [faces_of_parts[part] for part in np.flatnonzero(is_crumb)]
     surplus = [faces_of_parts[part] for part in np.flatnonzero(is_surplus)]
     return Parts(waving, crumbs, surplus)
+
+
+def smallest(shares: Floats, limit: float) -> Bools:
+    """Mask of the parts below a share of the area, smallest first, up to a little in all."""
+    ascending = np.argsort(shares, kind="stable")
+    is_small = np.zeros(len(shares), bool)
+    is_small[ascending] = np.cumsum(shares[ascending]) <= MAX_STILL_SHARE
+    return is_small & (shares < limit)
 
 
 def models_of(parts: list[Part], counts: list[int]) -> list[int]:

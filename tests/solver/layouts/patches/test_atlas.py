@@ -30,6 +30,7 @@ from ripple_sim.solver.layouts.patches import (
     patch_map,
     quads,
 )
+from ripple_sim.solver.layouts.patches.atlas import chart_side
 from ripple_sim.solver.layouts.patches.quads import Quads
 from ripple_sim.solver.layouts.patches.surface import TriangleSurface
 from ripple_sim.solver.texels import folded_texels
@@ -268,13 +269,83 @@ def crumbly() -> Atlas:
     return build_atlas(ball_and_crumbs(), 24, cache=False)
 
 
-def test_parts_smaller_than_a_texel_lie_still_and_are_named_once(crumbly: Atlas) -> None:
+def test_parts_smaller_than_a_few_texels_lie_still_and_are_named_once(crumbly: Atlas) -> None:
     (note,) = crumbly.notes
-    assert note.startswith("30 of 31 parts lie still: smaller than a texel")
+    assert note.startswith("30 of 31 parts lie still: each smaller than 12 texels")
     assert crumbly.texels.topology.still.sum() == 1
     quality = crumbly.quality()
     assert quality["flipped"] == quality["folded"] == 0
     assert quality["coverage"] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_heap_of_small_parts_carries_waves_on_all_but_a_twentieth_of_its_area() -> None:
+    """Each part is smaller than twelve texels, so that charts are as small as can be."""
+    count = 60
+    part = moved(sphere(0), (0, 0, 0), 0.4)
+    mesh = joined(*(moved(part, (i, 0, 0), 1.0) for i in range(count)))
+    atlas = build_atlas(mesh, 10, cache=False)
+    waves = ~atlas.texels.topology.still
+    carried = len(np.unique(mesh.components[atlas.triangles[waves]]))
+    assert 0.95 * count <= carried < count
+    assert atlas.resolution == 2
+    assert_atlas_carries_waves(atlas)
+
+
+@pytest.mark.parametrize(
+    ("charts", "side"),
+    [
+        pytest.param(6, 48, id="a cube"),
+        pytest.param(864, 4, id="as many texels as asked for"),
+        pytest.param(2592, 4, id="three times as many, in charts of the usual least size"),
+        pytest.param(2593, 3, id="more, unless charts are smaller"),
+        pytest.param(6660, 2, id="smaller still"),
+        pytest.param(20_000, 2, id="smallest"),
+    ],
+)
+def test_many_charts_are_small_so_that_texels_are_about_as_many_as_asked_for(
+    charts: int, side: int
+) -> None:
+    assert chart_side(charts, 48) == side
+
+
+def test_charts_of_2_x_2_texels_are_as_exact_as_larger_ones() -> None:
+    """Eigenvalues of the unit sphere up to degree 3; errors in units of the area of a texel."""
+    mesh = sphere(3)
+    exact = degrees(lambda d: 2 * d + 1)[1:16]
+    errors = {}
+    for cells, resolution in ((96, 8), (24, 11)):
+        atlas = atlas_from_patch_map(mesh, patch_map(mesh.V, mesh.F, cells), resolution)
+        texels = TexelMesh.of(
+            atlas.texels.topology, on_sphere(atlas.positions), normals=atlas.normals
+        )
+        found = eigenvalues(texels, 16)[1:]
+        errors[atlas.resolution] = np.abs(found / exact - 1).max() / texels.areas.mean()
+    assert sorted(errors) == [2, 4]
+    assert errors[2] < 1.5 * errors[4]
+
+
+def test_parts_on_which_texels_would_be_tiny_lie_still_and_are_named_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As thin rings do, which have many charts for their area."""
+    monkeypatch.setattr(layout, "_MAX_CROWDING", 0.5)
+    rings = [moved(torus(6), (x, 0, 0), 0.1) for x in (3, -3)]
+    atlas = build_atlas(joined(sphere(2), *rings), 24, cache=False)
+    (note,) = atlas.notes
+    assert "near (3, " in note
+    assert note.endswith(
+        "lies still, and so does 1 more: texels would be less than half as wide as elsewhere"
+    )
+    is_ring = np.abs(atlas.positions[..., 0]) > 2
+    still = atlas.texels.topology.still
+    assert is_ring[still].all()
+    assert not is_ring[~still].any()
+
+
+def test_the_largest_part_with_charts_carries_waves_however_tiny_its_texels() -> None:
+    shares = np.array([0.97, 0.02, 0.01])
+    charts = np.array([0, 12, 12])  # the largest part could not be laid out
+    assert list(layout._crowded(charts, shares, 100)) == [2]
 
 
 def test_every_texel_of_a_part_that_lies_still_is_found_where_it_lies(crumbly: Atlas) -> None:
