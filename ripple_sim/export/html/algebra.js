@@ -8,20 +8,65 @@ const times = (a, b) => Array.from(new DOMMatrix(a).multiply(new DOMMatrix(b)).t
 
 function placed(position, [w, x, y, z]) {
   return [
-    1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y), 0,
-    2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x), 0,
-    2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y), 0, ...position, 1];
+    1 - 2 * (y * y + z * z),
+    2 * (x * y + w * z),
+    2 * (x * z - w * y),
+    0,
+    2 * (x * y - w * z),
+    1 - 2 * (x * x + z * z),
+    2 * (y * z + w * x),
+    0,
+    2 * (x * z + w * y),
+    2 * (y * z - w * x),
+    1 - 2 * (x * x + y * y),
+    0,
+    ...position,
+    1,
+  ];
 }
 
 // World to eye coordinates of a camera: its axes are the columns right, up and backwards.
 function viewOf(position, right, up, back) {
-  return [right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0,
-          -dot(right, position), -dot(up, position), -dot(back, position), 1];
+  return [
+    right[0],
+    up[0],
+    back[0],
+    0,
+    right[1],
+    up[1],
+    back[1],
+    0,
+    right[2],
+    up[2],
+    back[2],
+    0,
+    -dot(right, position),
+    -dot(up, position),
+    -dot(back, position),
+    1,
+  ];
 }
 
 function perspective(fovy, aspect, near, far) {
-  const s = 1 / Math.tan(fovy * Math.PI / 360);
-  return [s / aspect, 0, 0, 0, 0, s, 0, 0, 0, 0, (near + far) / (near - far), -1, 0, 0, 2 * near * far / (near - far), 0];
+  const s = 1 / Math.tan((fovy * Math.PI) / 360);
+  return [
+    s / aspect,
+    0,
+    0,
+    0,
+    0,
+    s,
+    0,
+    0,
+    0,
+    0,
+    (near + far) / (near - far),
+    -1,
+    0,
+    0,
+    (2 * near * far) / (near - far),
+    0,
+  ];
 }
 
 function orthographic(half, depth) {

@@ -1,11 +1,14 @@
 // Buttons, keys, sliders and the pointer.
-const RATE = 30, LATE = 1.1, COARSEST = 0.6;  // frames a second that it takes care to show, by how much they may be late before fewer pixels are drawn, and how few
-const REFRESH = 17;  // of the screen [ms]
-const LONGEST_TICK = 0.1;  // of time that passes between two pictures [s]: after a rest, or where it is slow, time waits
-const DRAG_RATE = 12;  // pokes a second of a pointer that stays or moves
-const DRAG_SHARE = 0.35;  // of a click's impulse in each of them
-const TURN = 0.006;  // of the camera [radians a pixel]
-const LOG_RANGE = 2;  // a slider's ends multiply or divide by 4: two powers of 2
+const RATE = 30; // frames a second that it takes care to show
+const LATE = 1.1; // by how much they may be late before fewer pixels are drawn
+const COARSEST = 0.6; // share of the pixels along a side, at least
+const REFRESH = 17; // of the screen [ms]
+// of time that passes between two pictures [s]: after a rest, or where it is slow, time waits
+const LONGEST_TICK = 0.1;
+const DRAG_RATE = 12; // pokes a second of a pointer that stays or moves
+const DRAG_SHARE = 0.35; // of a click's impulse in each of them
+const TURN = 0.006; // of the camera [radians a pixel]
+const LOG_RANGE = 2; // a slider's ends multiply or divide by 4: two powers of 2
 
 function control(player) {
   const of = id => document.getElementById(id);
@@ -28,14 +31,19 @@ function control(player) {
   pointer(player, ui);
   programControls(player, ui);
   window.onresize = () => player.redraw();
-  player.canvas.addEventListener("webglcontextlost", event => { event.preventDefault(); player.lose(); });
+  player.canvas.addEventListener("webglcontextlost", event => {
+    event.preventDefault();
+    player.lose();
+  });
   player.canvas.addEventListener("webglcontextrestored", () => player.regain());
   ui.follow();
   clock(player, ui);
 }
 
 function follow(player, of) {
-  const slider = of("frame"), last = player.frames.count - 1, fps = player.meta.fps;
+  const slider = of("frame");
+  const last = player.frames.count - 1;
+  const fps = player.meta.fps;
   slider.min = player.frames.first || 0;
   slider.max = last;
   slider.value = player.number;
@@ -54,7 +62,8 @@ function buttons(player, ui) {
     follow();
   };
   let wanted = null;
-  of("frame").oninput = async () => {  // only the latest place, however fast it is dragged
+  of("frame").oninput = async () => {
+    // only the latest place, however fast it is dragged
     if (player.playing) play(false);
     player.following = false;
     const idle = wanted === null;
@@ -66,10 +75,18 @@ function buttons(player, ui) {
     }
     if (idle) follow();
   };
-  for (const id of ["heat", "contacts", "grid"]) of(id).onchange = event => { player[id] = event.target.checked; player.redraw(); };
-  of("camera").onclick = () => { player.orbit = null; player.redraw(); };
+  for (const id of ["heat", "contacts", "grid"])
+    of(id).onchange = event => {
+      player[id] = event.target.checked;
+      player.redraw();
+    };
+  of("camera").onclick = () => {
+    player.orbit = null;
+    player.redraw();
+  };
   of("picture").onclick = () => savePicture(player);
-  of("full").onclick = () => document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
+  of("full").onclick = () =>
+    document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
   of("tune").onclick = () => {
     of("panel").hidden = !of("panel").hidden;
     of("tune").setAttribute("aria-expanded", String(!of("panel").hidden));
@@ -104,32 +121,65 @@ function sliders(player, of) {
   of("waves").hidden = !player.live;
   const change = () => {
     if (player.send) {
-      player.send("factors", {factors: {speed: factor("wave-speed"), damping: factor("damping"), stiffness: factor("stiffness")}});
+      player.send("factors", {
+        factors: {speed: factor("wave-speed"), damping: factor("damping"), stiffness: factor("stiffness")},
+      });
       return;
     }
-    for (const surface of player.surfaces) if (surface) surface.sliders = slidersOf(surface.law, factor("wave-speed"), Number(of("damping").value), factor("stiffness"));
+    for (const surface of player.surfaces)
+      if (surface)
+        surface.sliders = slidersOf(
+          surface.law,
+          factor("wave-speed"),
+          Number(of("damping").value),
+          factor("stiffness"),
+        );
   };
   // the program makes new waves of it: once a slider stands
-  for (const id of ["wave-speed", "damping", "stiffness"]) of(id)[player.meta.stream ? "onchange" : "oninput"] = change;
-  of("plain").onclick = () => { for (const id of ["impulse", "wave-speed", "damping", "stiffness"]) of(id).value = 0; change(); };
+  for (const id of ["wave-speed", "damping", "stiffness"])
+    of(id)[player.meta.stream ? "onchange" : "oninput"] = change;
+  of("plain").onclick = () => {
+    for (const id of ["impulse", "wave-speed", "damping", "stiffness"]) of(id).value = 0;
+    change();
+  };
 }
 
 // More damping: up to the rate that ends a wave on its way over the object; less: down to none.
 function slidersOf(law, speed, damping, stiffness) {
   const mean = law.damping.reduce((sum, x) => sum + x, 0) / law.count;
-  const across = 4 * 0.4 * Math.sqrt(law.meta.rates.links) / Math.sqrt(law.count / 6);  // of waves that go 0.4 texels in 1 / sqrt(rate) [1/s]
+  // of waves that go 0.4 texels in 1 / sqrt(rate) [1/s]
+  const across = (4 * 0.4 * Math.sqrt(law.meta.rates.links)) / Math.sqrt(law.count / 6);
   return {speed, stiffness, damping: damping < 0 ? damping * mean : damping * (mean + across)};
 }
 
 function keys(player, ui) {
-  const {of} = ui, click = id => of(id).click();
+  const {of} = ui;
+  const click = id => of(id).click();
   const actions = {
-    " ": () => click("play"), n: () => step(player, ui, 1), b: () => step(player, ui, -1), r: () => click("restart"), c: () => click("heat"),
-    x: () => click("contacts"), g: () => click("grid"), f: () => click("full"), s: () => click("picture"), "0": () => click("camera"), m: () => click("tune"),
+    " ": () => click("play"),
+    n: () => step(player, ui, 1),
+    b: () => step(player, ui, -1),
+    r: () => click("restart"),
+    c: () => click("heat"),
+    x: () => click("contacts"),
+    g: () => click("grid"),
+    f: () => click("full"),
+    s: () => click("picture"),
+    0: () => click("camera"),
+    m: () => click("tune"),
   };
   if (player.meta.stream) {
-    const select = of("operator"), next = () => { select.selectedIndex = (select.selectedIndex + 1) % select.length; select.onchange(); };
-    Object.assign(actions, {t: () => click("throw"), o: next, v: () => click("record"), q: () => click("quit")});
+    const select = of("operator");
+    const next = () => {
+      select.selectedIndex = (select.selectedIndex + 1) % select.length;
+      select.onchange();
+    };
+    Object.assign(actions, {
+      t: () => click("throw"),
+      o: next,
+      v: () => click("record"),
+      q: () => click("quit"),
+    });
   }
   document.onkeydown = event => {
     const action = actions[event.key.toLowerCase()];
@@ -142,11 +192,14 @@ function keys(player, ui) {
 
 // On a surface the pointer pokes it, beside it and with other buttons or two fingers it moves the camera.
 function pointer(player, ui) {
-  const canvas = player.canvas, down = new Map();
-  let dragged = null, latest = 0, held = null;
+  const canvas = player.canvas;
+  const down = new Map();
+  let dragged = null;
+  let latest = 0;
+  let held = null;
   const place = ({clientX, clientY}) => {
     const box = canvas.getBoundingClientRect();
-    return [2 * (clientX - box.left) / box.width - 1, 1 - 2 * (clientY - box.top) / box.height];
+    return [(2 * (clientX - box.left)) / box.width - 1, 1 - (2 * (clientY - box.top)) / box.height];
   };
   const press = share => {
     const hit = dragged && player.pick(...dragged);
@@ -157,7 +210,9 @@ function pointer(player, ui) {
     if (!player.playing) ui.play(true);
     return true;
   };
-  ui.dragging = now => { if (dragged && now - latest > 1000 / DRAG_RATE) press(DRAG_SHARE); };
+  ui.dragging = now => {
+    if (dragged && now - latest > 1000 / DRAG_RATE) press(DRAG_SHARE);
+  };
   canvas.onpointerdown = event => {
     canvas.setPointerCapture(event.pointerId);
     down.set(event.pointerId, event);
@@ -180,7 +235,7 @@ function pointer(player, ui) {
     if (down.has(event.pointerId)) down.set(event.pointerId, event);
   };
   canvas.onwheel = event => {
-    if (window.top !== window && !document.hasFocus()) return;  // within another page, which scrolls
+    if (window.top !== window && !document.hasFocus()) return; // within another page, which scrolls
     event.preventDefault();
     player.free();
     player.orbit.distance *= Math.exp(0.001 * event.deltaY);
@@ -192,10 +247,13 @@ function pointer(player, ui) {
 // Turns the camera, or shifts it with the shift key or another button; two fingers shift and zoom.
 function moveCamera(player, down, event) {
   player.free();
-  const orbit = player.orbit, before = down.get(event.pointerId), share = 1 / down.size;
+  const orbit = player.orbit;
+  const before = down.get(event.pointerId);
+  const share = 1 / down.size;
   const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
   if (event.shiftKey || event.buttons > 1 || down.size > 1) {
-    const {right, up} = player.view(1), scale = 1.5 * share * orbit.distance / player.canvas.clientHeight;
+    const {right, up} = player.view(1);
+    const scale = (1.5 * share * orbit.distance) / player.canvas.clientHeight;
     orbit.focus = add(add(orbit.focus, right, -scale * dx), up, scale * dy);
   } else {
     orbit.azimuth -= TURN * dx;
@@ -211,36 +269,52 @@ function moveCamera(player, down, event) {
 
 // Lets time pass while it plays and is in view.
 function clock(player, ui) {
-  let last = performance.now(), drawn = last, late = 1, seen = true;
-  new IntersectionObserver(entries => { seen = entries.pop().isIntersecting; }).observe(player.canvas);
+  let last = performance.now();
+  let drawn = last;
+  let late = 1;
+  let seen = true;
+  new IntersectionObserver(entries => {
+    seen = entries.pop().isIntersecting;
+  }).observe(player.canvas);
   const tick = async now => {
-    const speed = Number(ui.of("speed").value) * player.meta.fps, count = player.frames.count;
+    const speed = Number(ui.of("speed").value) * player.meta.fps;
+    const count = player.frames.count;
     const elapsed = Math.min((now - last) / 1000, LONGEST_TICK) * Number(ui.of("speed").value);
     last = now;
     if (player.send && seen) {
       if (player.playing) ui.dragging(now);
-      if (player.following && player.newest > player.number && now - drawn > (player.drawing.software ? 900 / RATE : 0)) {
+      if (
+        player.following &&
+        player.newest > player.number &&
+        now - drawn > (player.drawing.software ? 900 / RATE : 0)
+      ) {
         await player.show(player.newest);
         drawn = now;
         ui.follow();
       }
     } else if (player.playing && seen) {
       ui.dragging(now);
-      const next = player.number + elapsed * player.meta.fps, over = player.frames.ended && next >= count - (player.live ? 1 : 0);
-      const due = player.live ? now - drawn > (player.drawing.software ? 900 / RATE : 0) : Math.floor(next) !== player.onCanvas;
+      const next = player.number + elapsed * player.meta.fps;
+      const over = player.frames.ended && next >= count - (player.live ? 1 : 0);
+      const due = player.live
+        ? now - drawn > (player.drawing.software ? 900 / RATE : 0)
+        : Math.floor(next) !== player.onCanvas;
       if (over && player.live) await liveOn(player, count - 1, next);
       else if (over) await player.show(0);
       else if (due) await player.show(next);
       else player.number = next;
       if (due) {
         late += 0.03 * (Math.min((now - drawn) / Math.max(1000 / speed, 1000 / RATE), 3) - late);
-        if (late > LATE && player.detail > COARSEST) { player.detail *= 0.8; late = 1; }
+        if (late > LATE && player.detail > COARSEST) {
+          player.detail *= 0.8;
+          late = 1;
+        }
         drawn = now;
         ui.follow();
       }
     }
     // where the next frame is far off, the browser may rest
-    const rest = player.live ? 0 : 1000 * (1 - player.number % 1) / speed - REFRESH;
+    const rest = player.live ? 0 : (1000 * (1 - (player.number % 1))) / speed - REFRESH;
     setTimeout(() => requestAnimationFrame(tick), player.playing ? Math.max(Math.min(rest, 100), 0) : 0);
   };
   requestAnimationFrame(tick);
@@ -254,7 +328,14 @@ async function liveOn(player, last, next) {
 }
 
 const player = new Player(document.getElementById("view"));
-window.ripplePlayer = {player, longestStep: law => longestStep(law, PLAIN), ready: player.start().then(() => { control(player); return player; })};
+window.ripplePlayer = {
+  player,
+  longestStep: law => longestStep(law, PLAIN),
+  ready: player.start().then(() => {
+    control(player);
+    return player;
+  }),
+};
 window.ripplePlayer.ready.catch(error => {
   const hint = document.getElementById("hint");
   hint.hidden = false;

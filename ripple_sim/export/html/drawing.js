@@ -1,12 +1,17 @@
-// Draws a frame with WebGL 2: shadow map, shadows on the floor, surfaces, floor and background, transparent surfaces, arrows. Where pixels
-// are drawn by software, edges are smoothed afterwards: samples would cost more; with alpha, the canvas is copied for nothing.
-const HEATED = [0.62, 0.62, 0.62];  // what is lit under the colours of heights
-const SHADOW_CELL = 4;  // texels of the shadow map between the points of surfaces in it
+// Draws a frame with WebGL 2: shadow map, shadows on the floor, surfaces, floor and background,
+// transparent surfaces, arrows. Where pixels are drawn by software, edges are smoothed afterwards:
+// samples would cost more; with alpha, the canvas is copied for nothing.
+const HEATED = [0.62, 0.62, 0.62]; // what is lit under the colours of heights
+const SHADOW_CELL = 4; // texels of the shadow map between the points of surfaces in it
 
 class Drawing {
   constructor(canvas, meta) {
     const software = drawsInSoftware();
-    const gl = canvas.getContext("webgl2", {antialias: !software, preserveDrawingBuffer: true, alpha: software});
+    const gl = canvas.getContext("webgl2", {
+      antialias: !software,
+      preserveDrawingBuffer: true,
+      alpha: software,
+    });
     if (!gl) throw new Error("this browser has no WebGL 2");
     Object.assign(this, {gl, canvas, meta, software});
     this.shadowSize = software ? 512 : 1024;
@@ -14,13 +19,21 @@ class Drawing {
     this.images = {};
     this.blank = colorsTexture(gl, [[255, 255, 255]]);
     this.heat = colorsTexture(gl, meta.heat);
-    this.environment = new Environment(gl, meta.light.boxes, meta.light.studio ? 1 : 0.5, meta.light.studio ? 1 : 0);
-    const cell = SHADOW_CELL * SHADOW_WIDTH * meta.distance / this.shadowSize;
+    this.environment = new Environment(
+      gl,
+      meta.light.boxes,
+      meta.light.studio ? 1 : 0.5,
+      meta.light.studio ? 1 : 0,
+    );
+    const cell = (SHADOW_CELL * SHADOW_WIDTH * meta.distance) / this.shadowSize;
     this.parts = meta.parts.map(part => partOf(gl, part, cell));
     this.drawn = grouped(gl, this.parts);
     this.arrow = partOf(gl, arrowPart(), cell);
     const sides = [this.shadowSize, this.shadowSize];
-    this.shadow = tableOf(gl, "DEPTH_COMPONENT24", ...sides, {...LINEAR, COMPARE_MODE: "COMPARE_REF_TO_TEXTURE"});
+    this.shadow = tableOf(gl, "DEPTH_COMPONENT24", ...sides, {
+      ...LINEAR,
+      COMPARE_MODE: "COMPARE_REF_TO_TEXTURE",
+    });
     this.blockers = tableOf(gl, "RG8", ...sides, {...LINEAR, MIN_FILTER: "LINEAR_MIPMAP_LINEAR"}, 8);
     this.target = framebufferOf(gl, {DEPTH_ATTACHMENT: this.shadow, COLOR_ATTACHMENT0: this.blockers});
     this.shades = tableOf(gl, "R8", this.shadowSize / 2, this.shadowSize / 2, LINEAR);
@@ -35,52 +48,96 @@ class Drawing {
       await image.decode();
       this.images[id] = imageTexture(this.gl, image, this.software);
     }
-    for (const part of this.parts) part.lit = this.software && part.target && !this.imageOf(part) ? new LitPoints(this.gl, part) : null;
+    for (const part of this.parts)
+      part.lit = this.software && part.target && !this.imageOf(part) ? new LitPoints(this.gl, part) : null;
   }
 
   makePrograms() {
-    const {gl, meta: {light: {lamps}, floor}, shadowSize} = this, near = lamps.some(lamp => lamp.position);
+    const {
+      gl,
+      meta: {
+        light: {lamps},
+        floor,
+      },
+      shadowSize,
+    } = this;
+    const near = lamps.some(lamp => lamp.position);
     const told = {lamps, near, taps: this.software ? 2 : 5, shadowSize};
-    const light = lightShader(told), lit = litShader(told), onFloor = floorShader(told);
+    const light = lightShader(told);
+    const lit = litShader(told);
+    const onFloor = floorShader(told);
     const plain = floor && !(floor.texture in this.meta.images) && !near;
-    this.floor = floor && new Floor(gl, floor, [floorVertex(light, onFloor), floorFragment(light, onFloor)], plain);
+    this.floor =
+      floor && new Floor(gl, floor, [floorVertex(light, onFloor), floorFragment(light, onFloor)], plain);
     this.sky = programOf(gl, EVERYWHERE_VERTEX, skyFragment(light));
     this.depth = programOf(gl, DEPTH_VERTEX, DEPTH_FRAGMENT);
     this.shading = programOf(gl, DEPTH_VERTEX, SHADE_FRAGMENT, [`SIZE ${shadowSize}.0`]);
     this.smoothing = programOf(gl, EVERYWHERE_VERTEX, SMOOTH_FRAGMENT);
     this.triangles = programOf(gl, LIT_POINTS_VERTEX, LIT_POINTS_FRAGMENT);
-    this.shaders = {surface: [SURFACE_VERTEX, surfaceFragment(light, lit)], points: [EVERYWHERE_VERTEX, pointsFragment(light, litShader({...told, taps: 4}))]};
+    this.shaders = {
+      surface: [SURFACE_VERTEX, surfaceFragment(light, lit)],
+      points: [EVERYWHERE_VERTEX, pointsFragment(light, litShader({...told, taps: 4}))],
+    };
     this.known = new Map();
   }
 
   // The program that lights pixels or, as `kind` tells, points.
   lighting(kind, {coat}, image, heat) {
     const features = {COAT: coat, TEXTURED: image, HEAT: heat};
-    const defined = Object.keys(features).filter(name => features[name]), key = [kind, ...defined].join(" ");
+    const defined = Object.keys(features).filter(name => features[name]);
+    const key = [kind, ...defined].join(" ");
     if (!this.known.has(key)) this.known.set(key, programOf(this.gl, ...this.shaders[kind], defined));
     return this.known.get(key);
   }
 
-  imageOf(part) { return this.images[part.texture]; }
+  imageOf(part) {
+    return this.images[part.texture];
+  }
 
   // Draws a target from now on as `displace` left it.
   upload(part) {
     const gl = this.gl;
-    for (const i of part.lit ? [0] : [0, 1, 3]) { gl.bindBuffer(gl.ARRAY_BUFFER, part.buffers[i]); gl.bufferSubData(gl.ARRAY_BUFFER, 0, part.data[i]); }
+    for (const i of part.lit ? [0] : [0, 1, 3]) {
+      gl.bindBuffer(gl.ARRAY_BUFFER, part.buffers[i]);
+      gl.bufferSubData(gl.ARRAY_BUFFER, 0, part.data[i]);
+    }
   }
 
-  // With what `view` and `bodies` say of the camera and the bodies' places; arrows are matrices; `heat`: targets show their heights.
-  // Everything is uploaded before anything is drawn, which would wait for it.
+  // With what `view` and `bodies` say of the camera and the bodies' places; arrows are matrices;
+  // `heat`: targets show their heights. Everything is uploaded before anything is drawn, which
+  // would wait for it.
   draw(view, bodies, arrows, heat) {
-    const gl = this.gl, light = lightOf(this.meta, view, this.environment.diffuse([0, 0, 1]), this.shadowSize);
-    const parts = this.placed(bodies, view.eye), casters = parts.filter(({part}) => part.opacity === 1);
+    const gl = this.gl;
+    const light = lightOf(this.meta, view, this.environment.diffuse([0, 0, 1]), this.shadowSize);
+    const parts = this.placed(bodies, view.eye);
+    const casters = parts.filter(({part}) => part.opacity === 1);
     const floor = this.meta.floor && this.setFloor(view, bodies, light, casters);
-    this.shared = {...light, eye: view.eye, viewProjection: view.matrix, shadowMap: 0, image: 1, heatColors: 2, places: 3, normals: 4, ambientMap: 5, coatMap: 6, mirrorMap: 7, shades: 8};
-    this.ready = new Set();  // programs that have these
+    this.shared = {
+      ...light,
+      eye: view.eye,
+      viewProjection: view.matrix,
+      shadowMap: 0,
+      image: 1,
+      heatColors: 2,
+      places: 3,
+      normals: 4,
+      ambientMap: 5,
+      coatMap: 6,
+      mirrorMap: 7,
+      shades: 8,
+    };
+    this.ready = new Set(); // programs that have these
     this.heated = heat;
-    gl.enable(gl.DEPTH_TEST); gl.enable(gl.CULL_FACE); gl.depthMask(true); gl.disable(gl.BLEND);
+    gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.CULL_FACE);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
     this.drawShadows(casters, light, floor);
-    this.bind(8, this.shades); this.bind(0, this.shadow); this.bind(2, this.heat); this.bind(5, this.environment.ambient); this.bind(6, this.environment.mirrored(COAT_ROUGHNESS));
+    this.bind(8, this.shades);
+    this.bind(0, this.shadow);
+    this.bind(2, this.heat);
+    this.bind(5, this.environment.ambient);
+    this.bind(6, this.environment.mirrored(COAT_ROUGHNESS));
     gl.disable(gl.DEPTH_TEST);
     for (const {part, model} of parts) if (part.lit) this.lightPoints(part, model);
     gl.enable(gl.DEPTH_TEST);
@@ -99,7 +156,8 @@ class Drawing {
 
   // Lights the points of a target for `drawPart`.
   lightPoints(part, model) {
-    this.bind(3, part.lit.places); this.bind(4, part.lit.normals);
+    this.bind(3, part.lit.places);
+    this.bind(4, part.lit.normals);
     this.look("points", part, model);
     this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, part.lit.target);
     this.gl.viewport(0, 0, COLUMNS, part.lit.rows);
@@ -111,7 +169,8 @@ class Drawing {
     const gl = this.gl;
     this.bind(1, this.screen);
     gl.copyTexImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 0, 0, this.canvas.width, this.canvas.height, 0);
-    gl.disable(gl.DEPTH_TEST); gl.disable(gl.CULL_FACE);
+    gl.disable(gl.DEPTH_TEST);
+    gl.disable(gl.CULL_FACE);
     gl.useProgram(this.smoothing.program);
     this.smoothing.set({image: 1});
     this.cover();
@@ -119,20 +178,29 @@ class Drawing {
 
   // Parts with their places, the most opaque first.
   placed(bodies, eye) {
-    return this.drawn.map(part => {
-      const model = part.parts ? IDENTITY : times(bodies[part.body], part.local);
-      if (part.parts) part.place(bodies, eye);
-      if (part.lit) part.lit.place(model, eye);
-      return {part, model, opacity: part.opacity * (1 - 0.6 * part.transparency)};
-    }).sort((a, b) => b.opacity - a.opacity);
+    return this.drawn
+      .map(part => {
+        const model = part.parts ? IDENTITY : times(bodies[part.body], part.local);
+        if (part.parts) part.place(bodies, eye);
+        if (part.lit) part.lit.place(model, eye);
+        return {part, model, opacity: part.opacity * (1 - 0.6 * part.transparency)};
+      })
+      .sort((a, b) => b.opacity - a.opacity);
   }
 
   // The floor's cells, and its uniforms.
   setFloor(view, bodies, light, casters) {
-    const floor = this.meta.floor, fade = this.meta.light.studio ? [0.4, 3.4] : [1.5, 10];
+    const floor = this.meta.floor;
+    const fade = this.meta.light.studio ? [0.4, 3.4] : [1.5, 10];
     const floorFrame = times(bodies[floor.body], placed(floor.position, floor.quaternion));
     this.floor.set(view, floorFrame, light, casters, 1.5 * fade[1] * view.distance);
-    return {focus: view.focus, fade: [...fade, view.distance], floorFrame, floorColor: floor.color, floorTiling: floor.tiling};
+    return {
+      focus: view.focus,
+      fade: [...fade, view.distance],
+      floorFrame,
+      floorColor: floor.color,
+      floorTiling: floor.tiling,
+    };
   }
 
   drawShadows(casters, {shadowMatrix, softness}, floor) {
@@ -141,11 +209,15 @@ class Drawing {
     gl.viewport(0, 0, this.shadowSize, this.shadowSize);
     gl.clear(gl.DEPTH_BUFFER_BIT | gl.COLOR_BUFFER_BIT);
     gl.useProgram(this.depth.program);
-    for (const {part, model} of casters) { this.depth.set({modelProjection: times(shadowMatrix, model)}); this.mesh(part, part.shadow); }
+    for (const {part, model} of casters) {
+      this.depth.set({modelProjection: times(shadowMatrix, model)});
+      this.mesh(part, part.shadow);
+    }
     this.bind(8, this.blockers);
     gl.generateMipmap(gl.TEXTURE_2D);
     if (!floor) return;
-    gl.disable(gl.DEPTH_TEST); gl.disable(gl.CULL_FACE);
+    gl.disable(gl.DEPTH_TEST);
+    gl.disable(gl.CULL_FACE);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.shadeTarget);
     gl.viewport(0, 0, this.shadowSize / 2, this.shadowSize / 2);
     gl.clear(gl.COLOR_BUFFER_BIT);
@@ -168,12 +240,19 @@ class Drawing {
 
   // The program that lights a part, with its look.
   look(kind, part, model) {
-    const heat = this.heated && part.target, image = heat ? null : this.imageOf(part), color = heat ? HEATED : part.color;
+    const heat = this.heated && part.target;
+    const image = heat ? null : this.imageOf(part);
+    const color = heat ? HEATED : part.color;
     this.bind(1, image || this.blank);
     this.bind(7, this.environment.mirrored(Math.max(part.roughness, 0.0632)));
     if (color) this.gl.vertexAttrib3fv(COLOR, color);
-    this.use(this.lighting(kind, part, image, heat), {model, open: Number(part.open), ...(color && {color}),
-      base: [part.roughness, part.metallic, part.sheen, part.coat], volume: [part.translucency, part.transparency, part.emission, part.opacity]});
+    this.use(this.lighting(kind, part, image, heat), {
+      model,
+      open: Number(part.open),
+      ...(color && {color}),
+      base: [part.roughness, part.metallic, part.sheen, part.coat],
+      volume: [part.translucency, part.transparency, part.emission, part.opacity],
+    });
   }
 
   bind(unit, texture) {
@@ -184,7 +263,10 @@ class Drawing {
   // Makes a program the present one, with what all have in common in this frame.
   use(program, uniforms = {}) {
     this.gl.useProgram(program.program);
-    if (!this.ready.has(program)) { this.ready.add(program); program.set(this.shared); }
+    if (!this.ready.has(program)) {
+      this.ready.add(program);
+      program.set(this.shared);
+    }
     program.set(uniforms);
   }
 
@@ -204,9 +286,10 @@ class Drawing {
       this.bind(1, this.imageOf(this.meta.floor) || this.blank);
       this.floor.draw(program => this.use(program, floor));
     }
-    const bare = floor ? this.floor.bare : [-1, 1], {width, height} = this.canvas;
+    const bare = floor ? this.floor.bare : [-1, 1];
+    const {width, height} = this.canvas;
     if (!bare) return;
-    const [low, high] = bare.map(y => (y + 1) / 2 * height);
+    const [low, high] = bare.map(y => ((y + 1) / 2) * height);
     gl.enable(gl.SCISSOR_TEST);
     gl.scissor(0, Math.floor(low), width, Math.ceil(high) - Math.floor(low));
     this.use(this.sky, {rayMiddle: view.ray[0], rayRight: view.ray[1], rayUp: view.ray[2]});
@@ -215,5 +298,7 @@ class Drawing {
   }
 
   // Draws everywhere with the present program.
-  cover() { this.gl.drawArrays(this.gl.TRIANGLES, 0, 3); }
+  cover() {
+    this.gl.drawArrays(this.gl.TRIANGLES, 0, 3);
+  }
 }

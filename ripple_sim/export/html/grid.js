@@ -1,5 +1,5 @@
 // The texels' grid as lines over a surface whose waves the page solves.
-const GRID_LIFT = 2e-3;  // of the lines off the surface [sizes of the object]
+const GRID_LIFT = 2e-3; // of the lines off the surface [sizes of the object]
 const GRID_VERTEX = shaderOf("grid.vert");
 const GRID_FRAGMENT = shaderOf("grid.frag");
 
@@ -17,7 +17,8 @@ class TexelGrid {
 
   draw(modelProjection, h) {
     const gl = this.gl;
-    gl.enable(gl.DEPTH_TEST); gl.enable(gl.BLEND);
+    gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
     gl.useProgram(this.program.program);
     this.program.set({modelProjection, lift: GRID_LIFT * this.law.meta.size});
     gl.bindVertexArray(this.array);
@@ -30,14 +31,21 @@ class TexelGrid {
 
 // Pairs of neighbours in a row or a column, and the normals of the texels.
 function gridOf({count, positions, samples: {width, around}}) {
-  const lines = [], normals = new Float32Array(3 * count), at = texel => Array.from(positions.subarray(3 * texel, 3 * texel + 3));
+  const lines = [];
+  const normals = new Float32Array(3 * count);
+  const at = texel => Array.from(positions.subarray(3 * texel, 3 * texel + 3));
   for (let place = 0; place < around.length; place++) {
-    const row = Math.floor(place / width) % width, column = place % width;
+    const row = Math.floor(place / width) % width;
+    const column = place % width;
     if (row === 0 || column === 0 || row === width - 1 || column === width - 1) continue;
-    const texel = around[place], [east, west, north, south] = [1, -1, width, -width].map(step => around[place + step]);
+    const texel = around[place];
+    const [east, west, north, south] = [1, -1, width, -width].map(step => around[place + step]);
     for (const other of [east, north]) if (other >= 0 && other !== texel) lines.push(texel, other);
-    const beside = other => other >= 0 ? at(other) : at(texel);
-    normals.set(unit(cross(add(beside(east), beside(west), -1), add(beside(north), beside(south), -1))), 3 * texel);
+    const beside = other => (other >= 0 ? at(other) : at(texel));
+    normals.set(
+      unit(cross(add(beside(east), beside(west), -1), add(beside(north), beside(south), -1))),
+      3 * texel,
+    );
   }
   return {lines: Uint32Array.from(lines), normals};
 }

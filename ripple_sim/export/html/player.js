@@ -1,42 +1,113 @@
 // The player: the run in time, its waves, and the picture. Tests and other pages may use `ripplePlayer`.
-const ARROW_LENGTH = 0.25;  // of the strongest contact, in distances of the camera
-const WIDEST_KEPT = 1.4;  // aspect of the scene's picture that is wholly in view on a tall screen
-const COLOR_SHARE = 0.8;  // of the greatest height so far, which has the strongest colours
+const ARROW_LENGTH = 0.25; // of the strongest contact, in distances of the camera
+const WIDEST_KEPT = 1.4; // aspect of the scene's picture that is wholly in view on a tall screen
+const COLOR_SHARE = 0.8; // of the greatest height so far, which has the strongest colours
 
 function arrowPart() {
-  const points = [], normals = [], F = [], sides = 10;
+  const points = [];
+  const normals = [];
+  const F = [];
+  const sides = 10;
   for (let i = 0; i < sides; i++) {
-    const a = 2 * Math.PI * i / sides, [x, y] = [Math.cos(a), Math.sin(a)], k = 5 * i, l = 5 * ((i + 1) % sides);
-    points.push(x * 0.03, y * 0.03, -1, x * 0.03, y * 0.03, -0.25, x * 0.09, y * 0.09, -0.25, 0, 0, 0, 0, 0, -1);
+    const a = (2 * Math.PI * i) / sides;
+    const [x, y] = [Math.cos(a), Math.sin(a)];
+    const k = 5 * i;
+    const l = 5 * ((i + 1) % sides);
+    points.push(
+      x * 0.03,
+      y * 0.03,
+      -1,
+      x * 0.03,
+      y * 0.03,
+      -0.25,
+      x * 0.09,
+      y * 0.09,
+      -0.25,
+      0,
+      0,
+      0,
+      0,
+      0,
+      -1,
+    );
     normals.push(x, y, 0, x, y, 0, x, y, 0.4, x, y, 0.4, 0, 0, -1);
-    F.push(k, l, k + 1, l, l + 1, k + 1, k + 2, l + 2, k + 3, k + 1, l + 1, l + 2, k + 1, l + 2, k + 2, k, k + 4, l);
+    F.push(
+      k,
+      l,
+      k + 1,
+      l,
+      l + 1,
+      k + 1,
+      k + 2,
+      l + 2,
+      k + 3,
+      k + 1,
+      l + 1,
+      l + 2,
+      k + 1,
+      l + 2,
+      k + 2,
+      k,
+      k + 4,
+      l,
+    );
   }
-  return {rest: points, directions: normals, F, points: 5 * sides, uv: null, position: [0, 0, 0], quaternion: [1, 0, 0, 0], open: true,
-    color: [0.85, 0.08, 0.05], roughness: 0.6, metallic: 0, sheen: 0, coat: 0, translucency: 0, transparency: 0, emission: 0.4, opacity: 1, texture: -1};
+  return {
+    rest: points,
+    directions: normals,
+    F,
+    points: 5 * sides,
+    uv: null,
+    position: [0, 0, 0],
+    quaternion: [1, 0, 0, 0],
+    open: true,
+    color: [0.85, 0.08, 0.05],
+    roughness: 0.6,
+    metallic: 0,
+    sheen: 0,
+    coat: 0,
+    translucency: 0,
+    transparency: 0,
+    emission: 0.4,
+    opacity: 1,
+    texture: -1,
+  };
 }
 
 class Player {
   constructor(canvas) {
-    Object.assign(this, {canvas, number: 0, playing: true, shown: 0, heat: false, contacts: false, grid: false, detail: 1});
-    this.orbit = null;  // azimuth and elevation [radians], distance and focus; null: the scene's camera
+    Object.assign(this, {
+      canvas,
+      number: 0,
+      playing: true,
+      shown: 0,
+      heat: false,
+      contacts: false,
+      grid: false,
+      detail: 1,
+    });
+    this.orbit = null; // azimuth and elevation [radians], distance and focus; null: the scene's camera
     this.poked = false;
     this.meta = JSON.parse(document.getElementById("meta").textContent);
-    this.work = Promise.resolve();  // what goes through time, one after the other
+    this.work = Promise.resolve(); // what goes through time, one after the other
   }
 
   async start() {
     readArrays(this.meta.parts, await bytesOf(document.getElementById("arrays").textContent));
     this.targets = this.meta.parts.filter(part => part.target);
-    this.frames = this.meta.stream ? new StreamedFrames(this.meta, this.targets) : new Frames(this.meta, this.targets);
+    this.frames = this.meta.stream
+      ? new StreamedFrames(this.meta, this.targets)
+      : new Frames(this.meta, this.targets);
     await this.frames.load();
-    Object.assign(this, {newest: 0, following: true});  // of frames that arrive: the latest, and whether it is shown
+    // of frames that arrive: the latest, and whether it is shown
+    Object.assign(this, {newest: 0, following: true});
     this.drawing = new Drawing(this.canvas, this.meta);
     await this.drawing.load();
     this.surfaces = await Promise.all(this.targets.map((part, target) => surfaceOf(part, target)));
     this.chooseSolvers();
     this.timeline = new Timeline(this.frames, this.surfaces);
     const least = 1e-4 * this.meta.distance;
-    this.limits = this.targets.map((_, i) => this.surfaces[i] ? least : this.meta.steps[i]);
+    this.limits = this.targets.map((_, i) => (this.surfaces[i] ? least : this.meta.steps[i]));
     this.strongest = 1e-9;
     await this.show(0);
   }
@@ -44,7 +115,11 @@ class Player {
   // The graphics card was lost, as on a sleeping phone: the loop has the waves as they were last drawn.
   lose() {
     this.drawing.lost = true;
-    for (const surface of this.surfaces) if (surface) { surface.solver.current = true; surface.use(new WaveLoop(surface.law)); }
+    for (const surface of this.surfaces)
+      if (surface) {
+        surface.solver.current = true;
+        surface.use(new WaveLoop(surface.law));
+      }
   }
 
   // It came back: everything that was on it is made anew.
@@ -58,21 +133,30 @@ class Player {
   }
 
   // Whether the page solves the waves of any target.
-  get live() { return this.surfaces.some(Boolean); }
+  get live() {
+    return this.surfaces.some(Boolean);
+  }
 
   // Solves the waves as it is faster here, or by "loop" or "pass".
-  chooseSolvers(kind) { this.surfaces.forEach(surface => surface && this.chooseSolver(surface, kind)); }
+  chooseSolvers(kind) {
+    this.surfaces.forEach(surface => surface && this.chooseSolver(surface, kind));
+  }
 
   chooseSolver(surface, kind) {
     const {gl, software} = this.drawing;
-    const loop = kind === "loop" || !kind && software || passFault(gl, surface.law);
-    const solver = loop ? new WaveLoop(surface.law) : kind ? new WavePass(surface.law, gl) : fasterSolver(surface.law, gl);
+    const loop = kind === "loop" || (!kind && software) || passFault(gl, surface.law);
+    const solver = loop
+      ? new WaveLoop(surface.law)
+      : kind
+        ? new WavePass(surface.law, gl)
+        : fasterSolver(surface.law, gl);
     if (solver) surface.use(solver);
   }
 
   // Takes over the law of a surface whose material or state has changed.
   async replaceSurface(target, meta) {
-    const before = this.surfaces[target], surface = await surfaceOf(this.targets[target], target, meta);
+    const before = this.surfaces[target];
+    const surface = await surfaceOf(this.targets[target], target, meta);
     if (before) before.solver.free();
     this.surfaces[target] = surface;
     this.chooseSolver(surface, before ? before.solver.kind : undefined);
@@ -106,11 +190,20 @@ class Player {
   // Draws the present state.
   async paint() {
     this.frame = await this.frames.get(this.timeline.frame);
-    this.next = this.timeline.frame + 1 < this.frames.count ? await this.frames.get(this.timeline.frame + 1) : this.frame;
+    this.next =
+      this.timeline.frame + 1 < this.frames.count
+        ? await this.frames.get(this.timeline.frame + 1)
+        : this.frame;
     this.targets.forEach((part, i) => {
-      const heights = this.heightsOf(i), V = this.frame.vertices[i];
+      const heights = this.heightsOf(i);
+      const V = this.frame.vertices[i];
       this.limits[i] = heights.reduce((most, height) => Math.max(most, Math.abs(height)), this.limits[i]);
-      displace(part, V ? this.frames.motions.get(String(i)).at(V) : part, heights, COLOR_SHARE * this.limits[i]);
+      displace(
+        part,
+        V ? this.frames.motions.get(String(i)).at(V) : part,
+        heights,
+        COLOR_SHARE * this.limits[i],
+      );
       this.drawing.upload(part);
     });
     this.onCanvas = Math.floor(this.number);
@@ -120,7 +213,8 @@ class Player {
 
   // Heights of a target's points [m]: the recorded ones, or those of its waves.
   heightsOf(target) {
-    const steps = this.frame.steps[target], surface = this.surfaces[target];
+    const steps = this.frame.steps[target];
+    const surface = this.surfaces[target];
     if (steps) return Float32Array.from(steps, step => step * this.meta.steps[target]);
     surface.settle();
     return surface.pointHeights();
@@ -129,18 +223,30 @@ class Player {
   redraw() {
     if (!this.frame || this.drawing.lost) return;
     const scale = (window.devicePixelRatio || 1) * (this.playing ? this.detail : 1);
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map(x => Math.max(1, Math.round(x * scale)));
-    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, {width, height});
-    this.drawing.draw(this.view(width / height), this.bodies(), this.contacts ? this.arrows() : [], this.heat);
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map(x =>
+      Math.max(1, Math.round(x * scale)),
+    );
+    if (this.canvas.width !== width || this.canvas.height !== height)
+      Object.assign(this.canvas, {width, height});
+    this.drawing.draw(
+      this.view(width / height),
+      this.bodies(),
+      this.contacts ? this.arrows() : [],
+      this.heat,
+    );
     if (this.grid) this.drawGrids(width / height);
   }
 
   drawGrids(aspect) {
-    const bodies = this.bodies(), {matrix} = this.view(aspect);
+    const bodies = this.bodies();
+    const {matrix} = this.view(aspect);
     this.surfaces.forEach(surface => {
       if (!surface) return;
       surface.grid = surface.grid || new TexelGrid(this.drawing.gl, surface.law);
-      surface.grid.draw(times(matrix, times(bodies[surface.part.body], surface.part.local)), surface.solver.h);
+      surface.grid.draw(
+        times(matrix, times(bodies[surface.part.body], surface.part.local)),
+        surface.solver.h,
+      );
     });
   }
 
@@ -151,48 +257,79 @@ class Player {
     return this.frame.pose.map((row, i) => between(row, this.next.pose[i], share));
   }
 
-  bodies() { return this.places().slice(1).map(row => placed(row.slice(0, 3), row.slice(3))); }
+  bodies() {
+    return this.places()
+      .slice(1)
+      .map(row => placed(row.slice(0, 3), row.slice(3)));
+  }
 
   arrows() {
     for (const arrow of this.frame.arrows) this.strongest = Math.max(this.strongest, Math.abs(arrow[6]));
     return this.frame.arrows.map(([x, y, z, nx, ny, nz, impulse]) => {
       const length = ARROW_LENGTH * this.meta.distance * Math.sqrt(Math.abs(impulse) / this.strongest);
-      const way = unit([nx, ny, nz]), side = unit(cross(Math.abs(way[2]) > 0.9 ? [1, 0, 0] : [0, 0, 1], way)), up = cross(way, side);
+      const way = unit([nx, ny, nz]);
+      const side = unit(cross(Math.abs(way[2]) > 0.9 ? [1, 0, 0] : [0, 0, 1], way));
+      const up = cross(way, side);
       return [...scaled(side, length), 0, ...scaled(up, length), 0, ...scaled(way, length), 0, x, y, z, 1];
     });
   }
 
   view(aspect) {
-    const [camera] = this.places(), m = placed(camera.slice(0, 3), camera.slice(3));
+    const [camera] = this.places();
+    const m = placed(camera.slice(0, 3), camera.slice(3));
     let [right, up, back, eye] = [m.slice(0, 3), m.slice(4, 7), m.slice(8, 11), camera.slice(0, 3)];
-    let distance = this.meta.distance, focus = add(eye, back, -distance);
+    let distance = this.meta.distance;
+    let focus = add(eye, back, -distance);
     if (this.orbit) {
       const {azimuth, elevation} = this.orbit;
       ({distance, focus} = this.orbit);
-      back = [Math.cos(elevation) * Math.cos(azimuth), Math.cos(elevation) * Math.sin(azimuth), Math.sin(elevation)];
+      back = [
+        Math.cos(elevation) * Math.cos(azimuth),
+        Math.cos(elevation) * Math.sin(azimuth),
+        Math.sin(elevation),
+      ];
       right = unit([-back[1], back[0], 0]);
       up = cross(back, right);
       eye = add(focus, back, distance);
     }
-    const fovy = this.fovy(aspect), half = Math.tan(fovy * Math.PI / 360), near = 0.02 * distance, far = 100 * distance;
-    return {eye, right, up, back, focus, distance, ray: [scaled(back, -1), scaled(right, half * aspect), scaled(up, half)],
-      matrix: times(perspective(fovy, aspect, near, far), viewOf(eye, right, up, back))};
+    const fovy = this.fovy(aspect);
+    const half = Math.tan((fovy * Math.PI) / 360);
+    const near = 0.02 * distance;
+    const far = 100 * distance;
+    return {
+      eye,
+      right,
+      up,
+      back,
+      focus,
+      distance,
+      ray: [scaled(back, -1), scaled(right, half * aspect), scaled(up, half)],
+      matrix: times(perspective(fovy, aspect, near, far), viewOf(eye, right, up, back)),
+    };
   }
 
-  // The scene's angle of view from below to above [degrees]; a wider one on a tall screen, so that as much is seen to the sides.
+  // The scene's angle of view from below to above [degrees]; a wider one on a tall screen, so that
+  // as much is seen to the sides.
   fovy(aspect) {
     const wider = Math.max(1, Math.min(this.meta.aspect, WIDEST_KEPT) / aspect);
-    return 360 / Math.PI * Math.atan(wider * Math.tan(this.meta.fovy * Math.PI / 360));
+    return (360 / Math.PI) * Math.atan(wider * Math.tan((this.meta.fovy * Math.PI) / 360));
   }
 
   // Takes the camera over from the scene.
   free() {
     if (this.orbit) return;
     const {back, focus, distance} = this.view(1);
-    this.orbit = {azimuth: Math.atan2(back[1], back[0]), elevation: Math.asin(Math.max(-1, Math.min(1, back[2]))), distance, focus};
+    this.orbit = {
+      azimuth: Math.atan2(back[1], back[0]),
+      elevation: Math.asin(Math.max(-1, Math.min(1, back[2]))),
+      distance,
+      focus,
+    };
   }
 
-  get aspect() { return this.canvas.clientWidth / this.canvas.clientHeight; }
+  get aspect() {
+    return this.canvas.clientWidth / this.canvas.clientHeight;
+  }
 
   // From the camera through a place of the canvas, from -1 to 1 both.
   way(x, y) {
@@ -202,7 +339,9 @@ class Player {
 
   // The live surface at a place of the canvas, and the point in the frame of its geom; null beside them.
   pick(x, y) {
-    const {eye} = this.view(this.aspect), way = this.way(x, y), bodies = this.bodies();
+    const {eye} = this.view(this.aspect);
+    const way = this.way(x, y);
+    const bodies = this.bodies();
     const live = this.targets.filter((_, i) => this.surfaces[i] && !this.frame.steps[i]);
     const hit = touched(live, part => times(bodies[part.body], part.local), eye, way);
     return hit && {surface: this.surfaces[this.targets.indexOf(hit.part)], point: hit.point};
@@ -224,8 +363,10 @@ class Player {
 async function surfaceOf(part, target, changed) {
   const script = document.querySelector(`script.law[data-target="${target}"]`);
   if (!script && !changed) return null;
-  const meta = changed || JSON.parse(script.textContent), surface = new Surface(part, lawOf(meta, await bytesOf(meta.arrays)));
-  const end = document.getElementById("end"), push = end ? JSON.parse(end.textContent).pushes[target] : 0;
+  const meta = changed || JSON.parse(script.textContent);
+  const surface = new Surface(part, lawOf(meta, await bytesOf(meta.arrays)));
+  const end = document.getElementById("end");
+  const push = end ? JSON.parse(end.textContent).pushes[target] : 0;
   surface.pulse = push || meta.pulse;
   return surface;
 }

@@ -1,14 +1,17 @@
 // Controls of the viewer, beyond those of every page: they ask the program for what it does.
-const MESSAGE_TIME = 5000;  // for which a message is shown [ms]
+const MESSAGE_TIME = 5000; // for which a message is shown [ms]
 
 function programControls(player, ui) {
-  const {of} = ui, {stream} = player.meta;
+  const {of} = ui;
+  const {stream} = player.meta;
   let silence = 0;
   ui.say = message => {
     const hint = of("hint");
     Object.assign(hint, {hidden: false, className: "", textContent: message});
     clearTimeout(silence);
-    silence = setTimeout(() => { hint.className = "gone"; }, MESSAGE_TIME);
+    silence = setTimeout(() => {
+      hint.className = "gone";
+    }, MESSAGE_TIME);
   };
   ui.paused = paused => ui.show(!paused);
   if (!stream) return;
@@ -30,12 +33,14 @@ function programControls(player, ui) {
 
 // Materials and looks, of one target or of all.
 function choiceControls(player, ui) {
-  const {of} = ui, {stream} = player.meta;
+  const {of} = ui;
+  const {stream} = player.meta;
   let choices = stream.chosen;
   player.targets.forEach(({name}, number) => of("target").add(new Option(name, number)));
   of("target").parentElement.hidden = choices.length < 2;
   const show = () => {
-    const number = Number(of("target").value), shown = number < 0 ? choices : [choices[number]];
+    const number = Number(of("target").value);
+    const shown = number < 0 ? choices : [choices[number]];
     for (const kind of ["preset", "look"]) {
       const names = new Set(shown.map(choice => choice[kind]));
       of(kind).value = names.size === 1 ? shown[0][kind] : "";
@@ -48,7 +53,10 @@ function choiceControls(player, ui) {
     };
   }
   of("target").onchange = show;
-  ui.chosen = chosen => { choices = chosen; show(); };
+  ui.chosen = chosen => {
+    choices = chosen;
+    show();
+  };
   show();
 }
 
@@ -64,14 +72,21 @@ function hideWhatIsNot(commands, of) {
 
 // A ball from the camera at the pointer.
 function throwBall(player, ui) {
-  const [x, y] = ui.place || [0, 0], {eye} = player.view(player.aspect);
+  const [x, y] = ui.place || [0, 0];
+  const {eye} = player.view(player.aspect);
   player.send("throw", {point: eye, way: player.way(x, y)});
 }
 
 // The view as `[camera]` of a scene file has it: the free camera of MuJoCo.
 function cameraEntry(player) {
-  const {back, focus, distance} = player.view(player.aspect), degrees = 180 / Math.PI;
-  return {lookat: focus, distance, azimuth: degrees * Math.atan2(-back[1], -back[0]), elevation: degrees * Math.asin(-back[2])};
+  const {back, focus, distance} = player.view(player.aspect);
+  const degrees = 180 / Math.PI;
+  return {
+    lookat: focus,
+    distance,
+    azimuth: degrees * Math.atan2(-back[1], -back[0]),
+    elevation: degrees * Math.asin(-back[2]),
+  };
 }
 
 // The same for the program, in millimetres and tenths of degrees; empty while it is the scene's.
@@ -89,24 +104,41 @@ function movedCamera(player) {
 }
 
 function copyCamera(player, ui) {
-  const {lookat, distance, azimuth, elevation} = cameraEntry(player), list = lookat.map(x => x.toFixed(3)).join(", ");
-  const lines = ["[camera]", `lookat = [${list}]`, `distance = ${distance.toFixed(3)}`, `azimuth = ${azimuth.toFixed(1)}`,
-    `elevation = ${elevation.toFixed(1)}`, `fovy = ${player.meta.fovy.toFixed(1)}`];
-  navigator.clipboard.writeText(lines.join("\n") + "\n").then(() => ui.say("The camera is in the clipboard."), () => ui.say(lines.join("  ")));
+  const {lookat, distance, azimuth, elevation} = cameraEntry(player);
+  const list = lookat.map(x => x.toFixed(3)).join(", ");
+  const lines = [
+    "[camera]",
+    `lookat = [${list}]`,
+    `distance = ${distance.toFixed(3)}`,
+    `azimuth = ${azimuth.toFixed(1)}`,
+    `elevation = ${elevation.toFixed(1)}`,
+    `fovy = ${player.meta.fovy.toFixed(1)}`,
+  ];
+  navigator.clipboard.writeText(lines.join("\n") + "\n").then(
+    () => ui.say("The camera is in the clipboard."),
+    () => ui.say(lines.join("  ")),
+  );
 }
 
-// The body under a place of the canvas that can move, the point in its frame, and the plane on which it is dragged; or null.
+// The body under a place of the canvas that can move, the point in its frame, and the plane on
+// which it is dragged; or null.
 function grabbed(player, x, y) {
-  const bodies = player.bodies(), {eye, back} = player.view(player.aspect), way = player.way(x, y);
+  const bodies = player.bodies();
+  const {eye, back} = player.view(player.aspect);
+  const way = player.way(x, y);
   const hit = touched(player.meta.parts, part => times(bodies[part.body], part.local), eye, way);
   if (!hit || hit.part.target || !player.meta.stream.movable.includes(hit.part.body)) return null;
-  const local = hit.part.local, place = [0, 1, 2].map(k => local[k] * hit.point[0] + local[4 + k] * hit.point[1] + local[8 + k] * hit.point[2] + local[12 + k]);
+  const local = hit.part.local;
+  const place = [0, 1, 2].map(
+    k => local[k] * hit.point[0] + local[4 + k] * hit.point[1] + local[8 + k] * hit.point[2] + local[12 + k],
+  );
   return {body: hit.part.body, point: place, plane: {normal: back, point: add(eye, way, hit.depth)}};
 }
 
 // Pulls a body to a place of the canvas.
 function pull(player, {body, point, plane}, x, y) {
-  const {eye} = player.view(player.aspect), way = player.way(x, y);
+  const {eye} = player.view(player.aspect);
+  const way = player.way(x, y);
   const depth = dot(add(plane.point, eye, -1), plane.normal) / dot(way, plane.normal);
   player.send("drag", {body, point, way: add(eye, way, depth)});
 }

@@ -1,5 +1,6 @@
-// A page of the viewer: MuJoCo runs in Python and sends frames as they happen; pokes, throws and all changes go back.
-const KEPT_FRAMES = 900;  // the time line goes back so far
+// A page of the viewer: MuJoCo runs in Python and sends frames as they happen; pokes, throws and
+// all changes go back.
+const KEPT_FRAMES = 900; // the time line goes back so far
 
 // Frames that arrive one after the other; the latest are kept.
 class StreamedFrames extends Frames {
@@ -8,13 +9,21 @@ class StreamedFrames extends Frames {
     Object.assign(this, {list: new Map(), first: 0, received: 0});
   }
 
-  get count() { return this.received; }
+  get count() {
+    return this.received;
+  }
 
-  get ended() { return false; }
+  get ended() {
+    return false;
+  }
 
-  async load() { await this.push(await bytesOf(this.tags[0].textContent)); }
+  async load() {
+    await this.push(await bytesOf(this.tags[0].textContent));
+  }
 
-  async get(number) { return this.list.get(Math.max(this.first, Math.min(number, this.received - 1))); }
+  async get(number) {
+    return this.list.get(Math.max(this.first, Math.min(number, this.received - 1)));
+  }
 
   // A chunk of one frame.
   async push(bytes) {
@@ -27,13 +36,22 @@ class StreamedFrames extends Frames {
 // Connects a player to the program that made its page. `ui` are its controls.
 function connect(player, ui) {
   const {stream} = player.meta;
-  const socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/socket${location.search}&page=${stream.number}`);
+  const socket = new WebSocket(
+    `${location.origin.replace(/^http/, "ws")}/socket${location.search}&page=${stream.number}`,
+  );
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({data}) => {
-    player.work = player.work.then(() => typeof data === "string" ? heard(player, ui, JSON.parse(data)) : arrived(player, data));
+    player.work = player.work.then(() =>
+      typeof data === "string" ? heard(player, ui, JSON.parse(data)) : arrived(player, data),
+    );
   };
-  socket.onclose = () => { ui.say("The program has ended."); ui.paused(true); };
-  player.send = (command, rest = {}) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({do: command, ...rest})); };
+  socket.onclose = () => {
+    ui.say("The program has ended.");
+    ui.paused(true);
+  };
+  player.send = (command, rest = {}) => {
+    if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({do: command, ...rest}));
+  };
 }
 
 async function arrived(player, data) {
@@ -44,7 +62,10 @@ async function arrived(player, data) {
 async function heard(player, ui, message) {
   if (message.say) ui.say(message.say);
   if ("paused" in message) ui.paused(message.paused);
-  if (message.reset) { player.timeline.forgetAll(); player.following = true; }
+  if (message.reset) {
+    player.timeline.forgetAll();
+    player.following = true;
+  }
   if (message.chosen) ui.chosen(message.chosen);
   if (message.look) {
     Object.assign(player.targets[message.look.target], message.look.content);
@@ -52,7 +73,11 @@ async function heard(player, ui, message) {
   }
   if (message.motion) {
     const script = document.createElement("script");
-    Object.assign(script, {type: "application/json", className: "motion", textContent: JSON.stringify(message.motion.content)});
+    Object.assign(script, {
+      type: "application/json",
+      className: "motion",
+      textContent: JSON.stringify(message.motion.content),
+    });
     script.dataset.target = message.motion.target;
     document.body.append(script);
   }

@@ -1,5 +1,5 @@
 // A surface whose waves the page solves: what acts on it, its steps, and its states.
-const STILL = 1e-6;  // heights and ways that nobody sees [sizes of the object]
+const STILL = 1e-6; // heights and ways that nobody sees [sizes of the object]
 
 class Surface {
   constructor(part, law) {
@@ -26,7 +26,8 @@ class Surface {
   }
 
   get state() {
-    const {h, v} = this.solver.read(), {texels, forces} = this.load;
+    const {h, v} = this.solver.read();
+    const {texels, forces} = this.load;
     return {h: h.slice(0, this.law.count), v: v.slice(0, this.law.count), load: {texels, forces}};
   }
 
@@ -41,7 +42,9 @@ class Surface {
   }
 
   // Heights of the part's points [m].
-  pointHeights() { return this.heights.at(this.solver.read().h); }
+  pointHeights() {
+    return this.heights.at(this.solver.read().h);
+  }
 
   // Forces [N], outwards, from now on.
   hold(texels, forces) {
@@ -52,17 +55,28 @@ class Surface {
 
   // Velocities [m/s] added now.
   kick(texels, velocities) {
-    const {law} = this, {h, v} = this.solver.read();
-    const everywhere = counterpart(law, texels, texels.map((texel, k) => law.mass[texel] * velocities[k]));
-    texels.forEach((texel, k) => { v[texel] += velocities[k]; });
-    if (everywhere.some(Boolean)) for (let i = 0; i < law.count; i++) v[i] += law.response[i] * everywhere[law.part[i]];
+    const {law} = this;
+    const {h, v} = this.solver.read();
+    const everywhere = counterpart(
+      law,
+      texels,
+      texels.map((texel, k) => law.mass[texel] * velocities[k]),
+    );
+    texels.forEach((texel, k) => {
+      v[texel] += velocities[k];
+    });
+    if (everywhere.some(Boolean))
+      for (let i = 0; i < law.count; i++) v[i] += law.response[i] * everywhere[law.part[i]];
     this.solver.touch();
     this.still = false;
   }
 
   // An impulse [N s], inwards, spread over texels by weights whose sum is 1.
   press({texels, weights}, impulse) {
-    this.kick(texels, texels.map((texel, k) => -impulse * weights[k] * this.law.share[texel] / this.law.mass[texel]));
+    this.kick(
+      texels,
+      texels.map((texel, k) => (-impulse * weights[k] * this.law.share[texel]) / this.law.mass[texel]),
+    );
   }
 
   // Recorded substeps, more of them where the sliders ask for it.
@@ -77,8 +91,11 @@ class Surface {
     const key = [dt, ...Object.values(this.sliders)].join(" ");
     if (!this.coefficients.has(key)) {
       if (this.coefficients.size > 8) this.coefficients.clear();
-      const {law, sliders} = this, coefficients = coefficientsOf(law, sliders, dt);
-      const balance = law.meta.balanced.some(kept => kept) ? new VolumeBalance(law, coefficients, sliders, dt) : null;
+      const {law, sliders} = this;
+      const coefficients = coefficientsOf(law, sliders, dt);
+      const balance = law.meta.balanced.some(kept => kept)
+        ? new VolumeBalance(law, coefficients, sliders, dt)
+        : null;
       this.coefficients.set(key, {coefficients, balance});
     }
     return this.coefficients.get(key);
@@ -87,8 +104,11 @@ class Surface {
   // Rests until something acts on it, where nothing is to be seen of its waves any more.
   settle() {
     if (this.still || this.load.texels.length) return;
-    const {h, v} = this.solver.read(), size = STILL * this.law.meta.size, time = longestStep(this.law, PLAIN);
-    for (let i = 0; i < this.law.count; i++) if (Math.abs(h[i]) > size || Math.abs(v[i]) * time > size) return;
+    const {h, v} = this.solver.read();
+    const size = STILL * this.law.meta.size;
+    const time = longestStep(this.law, PLAIN);
+    for (let i = 0; i < this.law.count; i++)
+      if (Math.abs(h[i]) > size || Math.abs(v[i]) * time > size) return;
     this.still = true;
   }
 }
@@ -98,7 +118,10 @@ const TRIED_SUBSTEPS = 12;
 function fasterSolver(law, gl) {
   const time = solver => {
     const coefficients = coefficientsOf(law, PLAIN, longestStep(law, PLAIN) / 2);
-    const run = substeps => { solver.advance(substeps, 1e-6, coefficients, PLAIN, null); solver.read(); };
+    const run = substeps => {
+      solver.advance(substeps, 1e-6, coefficients, PLAIN, null);
+      solver.read();
+    };
     run(2);
     const begin = performance.now();
     run(TRIED_SUBSTEPS);

@@ -1,18 +1,23 @@
-// The waves of a surface by a loop over its texels: as fast as a graphics card that is emulated, and for every browser.
+// The waves of a surface by a loop over its texels: as fast as a graphics card that is emulated,
+// and for every browser.
 
 class WaveLoop {
-  get kind() { return "loop"; }
+  get kind() {
+    return "loop";
+  }
 
   constructor(law) {
     this.law = law;
-    this.h = new Float32Array(law.count + 1);  // the last entry: a fixed rim, always 0
+    this.h = new Float32Array(law.count + 1); // the last entry: a fixed rim, always 0
     this.v = new Float32Array(law.count + 1);
     this.mixed = new Float32Array(law.count + 1);
     this.load = new Float32Array(law.count);
     this.acceleration = new Float64Array(law.parts);
   }
 
-  read() { return this; }
+  read() {
+    return this;
+  }
 
   touch() {}
 
@@ -27,8 +32,9 @@ class WaveLoop {
 
   // Substeps of dt [s] with coefficients for these sliders; see law.js.
   advance(substeps, dt, coefficients, {speed}, balance) {
-    const {h, v} = this, count = this.law.count;
-    for (let i = 0; i < count; i++) h[i] += dt / 2 * v[i];
+    const {h, v} = this;
+    const count = this.law.count;
+    for (let i = 0; i < count; i++) h[i] += (dt / 2) * v[i];
     for (let step = 0; step < substeps; step++) {
       const acceleration = balance ? balance.added(this) : this.acceleration;
       this.kick(coefficients, speed ** 2, acceleration);
@@ -38,20 +44,34 @@ class WaveLoop {
   }
 
   kick(coefficients, tension, acceleration) {
-    const {law: {count, begins, others, elastic, viscous, ratio, part, parts}, h, v, mixed, load} = this;
+    const {
+      law: {count, begins, others, elastic, viscous, ratio, part, parts},
+      h,
+      v,
+      mixed,
+      load,
+    } = this;
     // viscosity in proportion to tension acts as tension does on h + share v
-    const share = ratio / tension, single = parts === 1, pressure = acceleration[0];
+    const share = ratio / tension;
+    const single = parts === 1;
+    const pressure = acceleration[0];
     if (viscous) mixed.set(v);
     else for (let i = 0; i < count; i++) mixed[i] = h[i] + share * v[i];
     const field = viscous ? h : mixed;
     for (let i = 0, k = 0; i < count; i++) {
-      const here = field[i], end = begins[i + 1];
+      const here = field[i];
+      const end = begins[i + 1];
       let force = 0;
       for (; k < end; k++) force += elastic[k] * (field[others[k]] - here);
       force *= tension;
       if (viscous) for (let j = begins[i]; j < end; j++) force += viscous[j] * (mixed[others[j]] - mixed[i]);
-      const c = 4 * i, a = single ? pressure : acceleration[part[i]];
-      v[i] = coefficients[c + 1] * v[i] + coefficients[c] * (force + load[i]) - coefficients[c + 2] * h[i] + coefficients[c + 3] * a;
+      const c = 4 * i;
+      const a = single ? pressure : acceleration[part[i]];
+      v[i] =
+        coefficients[c + 1] * v[i] +
+        coefficients[c] * (force + load[i]) -
+        coefficients[c + 2] * h[i] +
+        coefficients[c + 3] * a;
     }
   }
 }
@@ -62,12 +82,14 @@ class VolumeBalance {
   constructor(law, coefficients, sliders, dt) {
     const {count, mass, inverseDensity, part, parts, response, stiffness} = law;
     const span = Float64Array.from({length: count}, (_, i) => {
-      const half = Math.max(law.damping[i] + sliders.damping, 0) * dt / 2;
+      const half = (Math.max(law.damping[i] + sliders.damping, 0) * dt) / 2;
       return dt / (1 + Math.max(half, 2 * half - 1));
     });
-    const inertia = new Float64Array(parts), mean = values => values.reduce((sum, x) => sum + x, 0) / count;
+    const inertia = new Float64Array(parts);
+    const mean = values => values.reduce((sum, x) => sum + x, 0) / count;
     for (let i = 0; i < count; i++) inertia[part[i]] += mass[i] * inverseDensity[i] * span[i] * response[i];
-    const meanSpan = mean(span), meanDecay = mean(Float64Array.from({length: count}, (_, i) => coefficients[4 * i + 1]));
+    const meanSpan = mean(span);
+    const meanDecay = mean(Float64Array.from({length: count}, (_, i) => coefficients[4 * i + 1]));
     // the forces of links by which heights and velocities that a pressure makes change the volume
     const moved = Float32Array.from(span, (time, i) => time * inverseDensity[i]);
     const links = new Float32Array(4 * count).map((_, i) => Number(i % 4 === 0));
@@ -82,15 +104,22 @@ class VolumeBalance {
     this.heights = new Float32Array(count);
     this.velocities = new Float32Array(count);
     for (let i = 0; i < count; i++) {
-      const scale = law.meta.balanced[part[i]] && inertia[part[i]] > 0 ? -1 / inertia[part[i]] : 0, weight = mass[i] * inverseDensity[i];
-      this.heights[i] = scale * (pulled[i] - weight * stiffness[i] * sliders.stiffness * (span[i] - meanSpan));
+      const scale = law.meta.balanced[part[i]] && inertia[part[i]] > 0 ? -1 / inertia[part[i]] : 0;
+      const weight = mass[i] * inverseDensity[i];
+      this.heights[i] =
+        scale * (pulled[i] - weight * stiffness[i] * sliders.stiffness * (span[i] - meanSpan));
       this.velocities[i] = scale * (weight * (coefficients[4 * i + 1] - meanDecay) + dragged[i]);
     }
   }
 
   // The acceleration of each part, with that of the load.
   added({h, v, acceleration}) {
-    const {law: {count, part}, total, heights, velocities} = this;
+    const {
+      law: {count, part},
+      total,
+      heights,
+      velocities,
+    } = this;
     total.set(acceleration);
     for (let i = 0; i < count; i++) total[part[i]] += heights[i] * h[i] + velocities[i] * v[i];
     return total;

@@ -1,4 +1,5 @@
-// The waves of a surface by one fragment pass a substep, over a texture of heights and velocities (shaders/wave_step.frag).
+// The waves of a surface by one fragment pass a substep, over a texture of heights and velocities
+// (shaders/wave_step.frag).
 
 const LOAD_VERTEX = shaderOf("wave_load.vert");
 const LOAD_FRAGMENT = shaderOf("wave_load.frag");
@@ -11,8 +12,8 @@ function passFault(gl, law) {
   return Math.max(width, height * most) > gl.getParameter(gl.MAX_TEXTURE_SIZE) ? "too many texels" : "";
 }
 
-// Width and height of a texture with a place for every texel and the fixed rim, so that all links fit about into a square,
-// and the greatest number of links of a texel.
+// Width and height of a texture with a place for every texel and the fixed rim, so that all links
+// fit about into a square, and the greatest number of links of a texel.
 function layoutOf({count, begins}) {
   let most = 1;
   for (let i = 0; i < count; i++) most = Math.max(most, begins[i + 1] - begins[i]);
@@ -21,7 +22,9 @@ function layoutOf({count, begins}) {
 }
 
 class WavePass {
-  get kind() { return "pass"; }
+  get kind() {
+    return "pass";
+  }
 
   constructor(law, gl) {
     const {width, height, most} = layoutOf(law);
@@ -35,7 +38,9 @@ class WavePass {
     this.coefficients = tableOf(gl, "RGBA32F", width, height);
     this.links = tableOf(gl, "RGBA32F", width, height * most);
     this.accelerations = tableOf(gl, "R32F", law.parts, 1);
-    this.targets = [...this.states, this.load].map(texture => framebufferOf(gl, {COLOR_ATTACHMENT0: texture}));
+    this.targets = [...this.states, this.load].map(texture =>
+      framebufferOf(gl, {COLOR_ATTACHMENT0: texture}),
+    );
     this.program = programOf(gl, EVERYWHERE_VERTEX, shaderOf("wave_step.frag"), [`WIDTH ${width}`]);
     this.loading = programOf(gl, LOAD_VERTEX, LOAD_FRAGMENT);
     this.array = gl.createVertexArray();
@@ -49,44 +54,81 @@ class WavePass {
 
   // Links that a texel does not have lead to itself, with weight 0.
   linkTable() {
-    const {law: {count, begins, others, elastic, viscous, part}, width, height, most} = this;
+    const {
+      law: {count, begins, others, elastic, viscous, part},
+      width,
+      height,
+      most,
+    } = this;
     const table = new Float32Array(4 * width * height * most);
-    for (let k = 0; k < most; k++) for (let i = 0; i < width * height; i++) {
-      const link = i < count ? begins[i] + k : 0, has = i < count && link < begins[i + 1];
-      table.set([has ? others[link] : i, has ? elastic[link] : 0, has && viscous ? viscous[link] : 0, part[i] || 0], 4 * (k * width * height + i));
-    }
+    for (let k = 0; k < most; k++)
+      for (let i = 0; i < width * height; i++) {
+        const link = i < count ? begins[i] + k : 0;
+        const has = i < count && link < begins[i + 1];
+        table.set(
+          [has ? others[link] : i, has ? elastic[link] : 0, has && viscous ? viscous[link] : 0, part[i] || 0],
+          4 * (k * width * height + i),
+        );
+      }
     return table;
   }
 
   upload(texture, channels, data) {
-    const gl = this.gl, width = Math.min(this.width, data.length / channels);
+    const gl = this.gl;
+    const width = Math.min(this.width, data.length / channels);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, data.length / channels / width, [0, gl.RED, gl.RG, 0, gl.RGBA][channels], gl.FLOAT, data);
+    gl.texSubImage2D(
+      gl.TEXTURE_2D,
+      0,
+      0,
+      0,
+      width,
+      data.length / channels / width,
+      [0, gl.RED, gl.RG, 0, gl.RGBA][channels],
+      gl.FLOAT,
+      data,
+    );
   }
 
   // Heights and velocities as they are now.
   read() {
     if (this.current) return this;
-    const gl = this.gl, {pixels, h, v, law: {count}} = this;
+    const {gl, pixels, h, v} = this;
+    const {count} = this.law;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.targets[0]);
     gl.readPixels(0, 0, this.width, this.height, gl.RGBA, gl.FLOAT, pixels);
-    for (let i = 0; i < count; i++) { h[i] = pixels[4 * i]; v[i] = pixels[4 * i + 1]; }
+    for (let i = 0; i < count; i++) {
+      h[i] = pixels[4 * i];
+      v[i] = pixels[4 * i + 1];
+    }
     this.current = true;
     return this;
   }
 
   // Takes over heights and velocities that were changed here.
   touch() {
-    const {h, v, law: {count}} = this, data = new Float32Array(2 * this.width * this.height);
-    for (let i = 0; i < count; i++) { data[2 * i] = h[i]; data[2 * i + 1] = v[i]; }
+    const {
+      h,
+      v,
+      law: {count},
+    } = this;
+    const data = new Float32Array(2 * this.width * this.height);
+    for (let i = 0; i < count; i++) {
+      data[2 * i] = h[i];
+      data[2 * i + 1] = v[i];
+    }
     this.upload(this.states[0], 2, data);
     this.current = true;
   }
 
   hold({texels, forces, acceleration}) {
-    const gl = this.gl, data = new Float32Array(2 * texels.length);
-    for (let k = 0; k < texels.length; k++) { data[2 * k] = texels[k]; data[2 * k + 1] = forces[k]; }
+    const gl = this.gl;
+    const data = new Float32Array(2 * texels.length);
+    for (let k = 0; k < texels.length; k++) {
+      data[2 * k] = texels[k];
+      data[2 * k + 1] = forces[k];
+    }
     this.acceleration = Float32Array.from(acceleration);
     this.upload(this.accelerations, 1, this.acceleration);
     this.begin(this.targets[2]);
@@ -122,7 +164,17 @@ class WavePass {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
     });
-    this.program.set({state: 0, links: 1, coefficients: 2, load: 3, acceleration: 4, linkCount: this.most, height: this.height, tension: speed ** 2, ratio: this.law.ratio});
+    this.program.set({
+      state: 0,
+      links: 1,
+      coefficients: 2,
+      load: 3,
+      acceleration: 4,
+      linkCount: this.most,
+      height: this.height,
+      tension: speed ** 2,
+      ratio: this.law.ratio,
+    });
     for (let step = 0; step < substeps; step++) {
       this.program.set({before: step ? 0 : dt / 2, after: step < substeps - 1 ? dt : dt / 2});
       this.begin(this.targets[1]);
@@ -137,7 +189,8 @@ class WavePass {
 
   free() {
     const gl = this.gl;
-    for (const texture of [...this.states, this.load, this.coefficients, this.links, this.accelerations]) gl.deleteTexture(texture);
+    for (const texture of [...this.states, this.load, this.coefficients, this.links, this.accelerations])
+      gl.deleteTexture(texture);
     for (const target of this.targets) gl.deleteFramebuffer(target);
   }
 }
