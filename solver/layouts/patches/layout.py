@@ -444,12 +444,12 @@ def _quads_of_parts(
     charts = np.array([len(quads[model].glued) if model in quads else 0 for model in models])
     if texels is not None:
         failures |= _crowded(charts, shares, texels)
-    carried = [i for i in range(len(parts)) if i not in failures]
-    chart_count = int(charts[carried].sum())
-    wanted = shares / shares[carried].sum() * chart_count
+    waving = [i for i in range(len(parts)) if i not in failures]
+    chart_count = int(charts[waving].sum())
+    wanted = shares / shares[waving].sum() * chart_count
     are_many = chart_count > _MAX_CHARTS_PER_CELL * sum(counts)
     tolerance = _MAX_CHART_ERROR_OF_MANY if are_many else _MAX_CHART_ERROR
-    if len(carried) > 1:
+    if len(waving) > 1:
         for i in sorted(quads.keys() - failures.keys()):
             if shares[i] > _NEGLIGIBLE_AREA:
                 report(f"cutting part {i + 1} of {len(parts)} again")
