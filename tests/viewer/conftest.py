@@ -7,13 +7,13 @@ from ripple_sim.viewer import Opened, Session, opened
 
 
 @pytest.fixture(scope="module")
-def origin() -> Opened:
+def ball() -> Opened:
     return opened("sphere")
 
 
 @pytest.fixture(scope="module")
-def scene(origin: Opened) -> Scene:
-    return origin.scene
+def scene(ball: Opened) -> Scene:
+    return ball.scene
 
 
 @pytest.fixture

@@ -37,9 +37,9 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture
-def view(origin: Opened, tmp_path: Path) -> PageView:
-    session = Session(origin.scene, resolution=12, has_skins=False)
-    return view_of(session, tmp_path, 12, origin)
+def view(ball: Opened, tmp_path: Path) -> PageView:
+    session = Session(ball.scene, resolution=12, has_skins=False)
+    return view_of(session, tmp_path, 12, ball)
 
 
 class Page:

@@ -51,16 +51,16 @@ def test_a_mesh_gets_an_mjcf_with_its_image_and_its_events(sheet: Path, tmp_path
         np.testing.assert_allclose(kept, own, atol=1e-6)
 
 
-def test_chosen_materials_are_those_of_the_saved_scene(origin: Opened, tmp_path: Path) -> None:
+def test_chosen_materials_are_those_of_the_saved_scene(ball: Opened, tmp_path: Path) -> None:
     """A preset, factors of a preset, and factors of the scene's own material."""
-    ripples = Simulation(origin.scene, resolution=20).ripples
+    ripples = Simulation(ball.scene, resolution=20).ripples
     (name,) = ripples
     own = ripples[name].material
     choices = Choices(ripples)
 
     def saved() -> Material:
-        entries = [choices.chosen(entry) for entry in origin.scene.targets]
-        save_scene(origin, entries, origin.scene.camera, tmp_path / "saved.toml")
+        entries = [choices.chosen(entry) for entry in ball.scene.targets]
+        save_scene(ball, entries, ball.scene.camera, tmp_path / "saved.toml")
         return load_scene(tmp_path / "saved.toml").targets[0].material.material()
 
     choices.choose_preset([name], "gelatine-5")
@@ -77,23 +77,23 @@ def test_chosen_materials_are_those_of_the_saved_scene(origin: Opened, tmp_path:
     np.testing.assert_equal(vars(ripples[name].material), vars(own))
 
 
-def test_factors_of_a_material_that_varies_are_refused(origin: Opened) -> None:
-    ripples = Simulation(origin.scene, resolution=8).ripples
+def test_factors_of_a_material_that_varies_are_refused(ball: Opened) -> None:
+    ripples = Simulation(ball.scene, resolution=8).ripples
     (name,) = ripples
     areas = ripples[name].atlas.areas
     ripples.change_material(name, speed=np.linspace(0.5, 1.0, areas.size).reshape(areas.shape))
     choices = Choices(ripples)
     choices.choose_factors({"damping": 2.0})
     with pytest.raises(ValueError, match="varies over the surface"):
-        choices.chosen(origin.scene.targets[0])
+        choices.chosen(ball.scene.targets[0])
 
 
-def test_a_camera_that_was_moved_is_free_and_keeps_its_lens(origin: Opened) -> None:
+def test_a_camera_that_was_moved_is_free_and_keeps_its_lens(ball: Opened) -> None:
     place = {"lookat": [0, 0, 1], "distance": 2, "azimuth": 30, "elevation": -10, "fovy": 40}
-    camera = moved_camera(origin.scene, place)
+    camera = moved_camera(ball.scene, place)
     assert camera.azimuth == 30
     assert camera.orbit == 0
     assert camera.key == []
-    assert camera.exposures == origin.scene.camera.exposures
+    assert camera.exposures == ball.scene.camera.exposures
     with pytest.raises(RippleError, match="distance"):
-        moved_camera(origin.scene, {**place, "distance": "far"})
+        moved_camera(ball.scene, {**place, "distance": "far"})
