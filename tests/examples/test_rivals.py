@@ -41,7 +41,7 @@ def test_rival_follows_the_backend(
     rival = RIVALS[name](operator)
     solver = make_backend("cpu", operator)
     rival.set_height(START)
-    solver.set_height(START)
+    solver.fields.set_height(START)
     dt = 0.7 * operator.stable_timestep
     # the solver drifts half a step before each kick and half a step after: the first half moves
     # nothing, at a velocity of 0, and the rival, which drifts a whole step after each kick, is
@@ -50,6 +50,7 @@ def test_rival_follows_the_backend(
     solver.advance(SUBSTEPS, dt)
     height, velocity = rival.state()
     assert (
-        np.abs(height - dt / 2 * velocity - solver.height()).max() < ROUND_OFF * np.abs(START).max()
+        np.abs(height - dt / 2 * velocity - solver.fields.height()).max()
+        < ROUND_OFF * np.abs(START).max()
     )
-    assert np.abs(velocity - solver.velocity()).max() < ROUND_OFF * np.abs(velocity).max()
+    assert np.abs(velocity - solver.fields.velocity()).max() < ROUND_OFF * np.abs(velocity).max()

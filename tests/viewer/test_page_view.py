@@ -190,7 +190,7 @@ def test_pages_and_videos_are_written_to_the_folder(page: Page, opengl: None) ->
     folder = page.view.folder
     page.tab.evaluate("ripplePlayer.player.send('share')")
     page.wait_for(lambda: (folder / "sphere-1.html").exists())
-    assert 'class="law"' in (folder / "sphere-1.html").read_text()
+    assert 'class="law"' in (folder / "sphere-1.html").read_text(encoding="utf-8")
     page.tab.evaluate("ripplePlayer.player.send('record')")
     page.wait_until("document.getElementById('hint').textContent.startsWith('recording')")
     page.tab.evaluate("ripplePlayer.player.send('record')")
