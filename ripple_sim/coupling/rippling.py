@@ -37,6 +37,8 @@ class RipplingSurface:
     options : mapping
         Keyword arguments of `WaveSolver`.
     waves : TargetWaves
+    resolution : int
+        Resolution that the atlas was asked for; charts of patches have fewer texels along a side.
     held : float64 [C, n, n], optional
         Shares of the texels that are held still, 0 to 1.
     layout : str
@@ -49,6 +51,7 @@ class RipplingSurface:
     material: Material
     options: Mapping[str, Any]
     waves: TargetWaves
+    resolution: int
     held: NDArray[np.float64] | None = None
     layout: str = "auto"
     shape: WatchedShape | None = None
@@ -71,7 +74,7 @@ class RipplingSurface:
                     f"the surface of {name!r} was changed in the model, and {what}, which belongs "
                     "to the old one: make new Ripples for the model as it is now"
                 )
-        atlas = target_atlas(model, self.id, old.rest.resolution, self.layout)
+        atlas = target_atlas(model, self.id, self.resolution, self.layout)
         new = old.on(atlas, self.material, **self.options)
         new.listeners.find_points = old.listeners.find_points
         return dataclasses.replace(self, waves=new, shape=WatchedShape(model, self.id))
@@ -160,12 +163,13 @@ def rippling_surfaces(
         layout = target.layout or "auto"
         own_options = {**options, "rim": target.rim, "conserve_volume": target.conserve_volume}
         material = suited.materials[name]
-        atlas = target_atlas(model, target_id, suited.resolutions[name], layout)
+        resolution = suited.resolutions[name]
+        atlas = target_atlas(model, target_id, resolution, layout)
         waves = TargetWaves(whereabouts, target_id, atlas, material, **own_options)
         waves.listeners.find_points = functools.partial(site_on, model, target_id)
         shape = WatchedShape(model, target_id)
         surfaces[name] = RipplingSurface(
-            target_id, material, own_options, waves, layout=layout, shape=shape
+            target_id, material, own_options, waves, resolution, layout=layout, shape=shape
         )
     easings = {find_target(model, name): law for name, law in suited.easings.items()}
     return surfaces, easings

@@ -252,9 +252,14 @@ def test_lost_images_are_named_in_one_line(tmp_path: Path) -> None:
     assert (model.tex_data.reshape(-1, 3)[0] == [0, 255, 0]).all()
 
 
-@pytest.mark.parametrize("mode", ["I;16", "F", "LA", "P", "1", "CMYK"])
-@pytest.mark.parametrize("kind", ["png", "tif"])
-def test_image_of_every_depth_become_bytes(tmp_path: Path, mode: str, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "mode"),
+    [
+        *(("png", mode) for mode in ("I;16", "LA", "P", "1")),
+        *(("tif", mode) for mode in ("I;16", "F", "LA", "P", "1", "CMYK")),
+    ],
+)
+def test_images_of_every_depth_become_bytes(tmp_path: Path, mode: str, kind: str) -> None:
     grey = np.array([[0, 64], [128, 255]], np.uint8)
     if mode == "I;16":
         image = Image.fromarray(grey.astype(np.uint16) * 257)
@@ -262,8 +267,6 @@ def test_image_of_every_depth_become_bytes(tmp_path: Path, mode: str, kind: str)
         image = Image.fromarray((grey / 255).astype(np.float32))
     else:
         image = Image.fromarray(grey).convert(mode)
-    if (kind, mode) in (("png", "F"), ("png", "CMYK")):
-        pytest.skip("PNG has no such pixels")
     image.save(tmp_path / f"a.{kind}")
     expected = grey if mode != "1" else np.where(np.asarray(image), 255, 0)
     found = load_image(tmp_path / f"a.{kind}")
