@@ -322,6 +322,6 @@ def test_a_page_names_the_targets_that_it_replays_with_the_reason(
         Exporter(scene.model, ripples, tmp_path / "dents.html") as exporter,
     ):
         exporter.write(forwarded(scene.model))
-    assert 'class="law"' not in (tmp_path / "dents.html").read_text()
+    assert 'class="law"' not in (tmp_path / "dents.html").read_text(encoding="utf-8")
     export_scene(scene, tmp_path / "film.html", ExportOptions(duration=0.02, replay=True))
-    assert 'class="law"' not in (tmp_path / "film.html").read_text()
+    assert 'class="law"' not in (tmp_path / "film.html").read_text(encoding="utf-8")

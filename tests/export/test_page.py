@@ -90,7 +90,7 @@ def test_triangles_and_vertices_lie_close_to_their_neighbours_in_order() -> None
 
 
 def test_a_page_is_one_file_that_asks_for_nothing_else(page: Path) -> None:
-    text = page.read_text()
+    text = page.read_text(encoding="utf-8")
     assert not re.search(r'https?://|src="|href="', text)
     assert [each.name for each in page.parent.iterdir()] == ["run.html"]
     assert made_here(page)
@@ -98,7 +98,7 @@ def test_a_page_is_one_file_that_asks_for_nothing_else(page: Path) -> None:
 
 def test_a_pages_lamps_have_highlights_as_weak_as_ours(page: Path) -> None:
     (meta,) = re.findall(
-        r'<script type="application/json" id="meta">(.+)</script>', page.read_text()
+        r'<script type="application/json" id="meta">(.+)</script>', page.read_text(encoding="utf-8")
     )
     gloss = [lamp["gloss"] for lamp in json.loads(meta)["light"]["lamps"]]
     # sRGB 0.1 over 0.3, as light; the headlight's
@@ -113,7 +113,7 @@ def test_in_a_notebook_a_complete_page_plays(
         assert "not complete" in exporter._repr_html_()
     shown = exporter._repr_html_()
     assert shown.startswith("<iframe srcdoc=")
-    assert html.unescape(shown.split('"')[1]) == (tmp_path / "run.html").read_text()
+    assert html.unescape(shown.split('"')[1]) == (tmp_path / "run.html").read_text(encoding="utf-8")
 
 
 def test_players_show_inside_the_page_of_a_notebook(
@@ -128,7 +128,8 @@ def test_players_show_inside_the_page_of_a_notebook(
     ours = renderer.render(data)
     notebook = tmp_path / "notebook.html"
     notebook.write_text(
-        f"<!DOCTYPE html><body>{exporter._repr_html_()}{renderer._repr_html_()}</body>"
+        f"<!DOCTYPE html><body>{exporter._repr_html_()}{renderer._repr_html_()}</body>",
+        encoding="utf-8",
     )
     with opened(browser, notebook) as tab:
         assert len(tab.frames) == 3
