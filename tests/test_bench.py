@@ -64,7 +64,7 @@ def test_the_modes_have_errors_for_every_operator_and_ours_is_of_second_order() 
     assert errors["fem"]["order"] == pytest.approx(-slope)
 
 
-def test_an_error_is_that_of_the_mode_against_itself_one_period_earlier() -> None:
+def test_the_error_of_a_mode_compares_it_with_itself_one_period_earlier() -> None:
     assert bench.sphere_mode_error(16) == pytest.approx(mode_error(16), rel=1e-12)
     assert 0 < bench.sphere_mode_error(16) < bench.sphere_mode_error(16, "paper")
 

@@ -58,14 +58,14 @@ def plain_user(tmp_path: Path) -> Iterator[None]:
         os.seteuid(0)
 
 
-def test_no_vendor_file(tmp_path: Path) -> None:
+def test_a_missing_vendor_file_is_reported_with_the_package(tmp_path: Path) -> None:
     report = info(__EGL_VENDOR_LIBRARY_DIRS=str(tmp_path))
     assert report["opengl"] is None
     assert f"there is no EGL vendor file (*.json) in {tmp_path}" in report["advice"]
     assert "apt-get install libegl-mesa0" in report["advice"]
 
 
-def test_a_vendor_file_that_is_damaged_or_whose_library_is_missing(tmp_path, monkeypatch) -> None:
+def test_a_damaged_vendor_file_and_its_missing_library_are_reported(tmp_path, monkeypatch) -> None:
     file = tmp_path / "10_nvidia.json"
     gone = "libEGL_nvidia_gone.so.0"
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))
@@ -76,7 +76,7 @@ def test_a_vendor_file_that_is_damaged_or_whose_library_is_missing(tmp_path, mon
         assert f"{file} {said}" in finding
 
 
-def test_a_broken_library(tmp_path: Path) -> None:
+def test_a_broken_library_is_reported_with_the_package(tmp_path: Path) -> None:
     library = "libGL.so.1"
     # found before the real one, and no library
     (tmp_path / library).write_bytes(b"\x7fELF nothing")
@@ -86,18 +86,20 @@ def test_a_broken_library(tmp_path: Path) -> None:
     assert "apt-get install --reinstall libgl1" in report["advice"]
 
 
-def test_a_missing_library(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_library_is_reported_with_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ripple_sim.diagnostics._LIBRARIES", {"libEGL-gone.so.1": "libegl1"})
     [finding] = find_problems(None)
     assert finding == "the library libEGL-gone.so.1 is missing: apt-get install libegl1"
 
 
-def test_software_where_there_is_no_gpu(tmp_path: Path) -> None:
+def test_software_rendering_is_reported_if_there_is_no_gpu(tmp_path: Path) -> None:
     [finding] = find_problems(True, tmp_path)
     assert "OpenGL runs in software" in finding and "there is no GPU" in finding
 
 
-def test_no_permission_on_the_render_node(devices: Path, plain_user: None) -> None:
+def test_missing_permission_on_the_render_node_is_reported_with_its_group(
+    devices: Path, plain_user: None
+) -> None:
     node = devices / "dri" / "renderD128"
     mode = node.stat().st_mode & 0o777
     group_of_node = node.stat().st_gid
@@ -112,7 +114,7 @@ def test_no_permission_on_the_render_node(devices: Path, plain_user: None) -> No
         assert f" {grp.getgrgid(group_of_node).gr_name} $USER" in finding
 
 
-def test_an_nvidia_gpu_without_its_egl_library(
+def test_an_nvidia_gpu_without_its_egl_library_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "nvidia0").touch()
@@ -130,7 +132,7 @@ def test_an_nvidia_gpu_without_its_egl_library(
     assert find_problems(True, tmp_path) == []
 
 
-def test_on_a_gpu_there_is_nothing_to_say(devices: Path) -> None:
+def test_no_finding_on_a_gpu(devices: Path) -> None:
     assert find_problems(False, devices) == []
 
 

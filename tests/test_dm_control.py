@@ -32,7 +32,9 @@ if importlib.util.find_spec("dm_control"):
 
 @pytest.mark.parametrize("make", KINDS)
 @pytest.mark.parametrize("legacy", [True, False])
-def test_each_physics_step_counts(make: Any, legacy: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_waves_advance_at_each_physics_step(
+    make: Any, legacy: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("MUJOCO_GL", "disable")
     physics = make(MODEL)
     physics.legacy_step = legacy

@@ -100,7 +100,7 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("kind", [BallEnv, NewModelEnv])
-def test_each_physics_step_counts(kind: type, path: Path) -> None:
+def test_waves_advance_at_each_physics_step(kind: type, path: Path) -> None:
     env = RippleWrapper(kind(path) if kind is BallEnv else kind(), MATERIALS, **OPTIONS)
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
@@ -234,9 +234,7 @@ def add_ball(scene: mujoco.MjvScene) -> None:
 
 
 @pytest.mark.parametrize("kind", [BallEnv, MarkedEnv, HoldingEnv, RendererEnv])
-def test_an_environment_draws_by_its_own_render_and_with_its_own_camera(
-    kind: type, path: Path
-) -> None:
+def test_an_environments_own_render_and_camera_are_used(kind: type, path: Path) -> None:
     env = RippleWrapper(kind(path, render_mode="depth_array", default_camera_config=CAMERA), {})
     env.reset()
     mujoco.mj_forward(env.unwrapped.model, env.unwrapped.data)
@@ -329,7 +327,7 @@ def test_make_vec_makes_ripples_in_this_process_and_in_another(
     envs.close()
 
 
-def test_frames_and_limits_of_gymnasiums_wrappers_go_around_it(path: Path) -> None:
+def test_gymnasiums_wrappers_work_around_a_ripple_wrapper(path: Path) -> None:
     env = RippleWrapper(BallEnv(path, render_mode="rgb_array"), MATERIALS, **OPTIONS)
     env = gymnasium.wrappers.TimeLimit(gymnasium.wrappers.PassiveEnvChecker(env), 2)
     env = gymnasium.wrappers.RenderCollection(env)
@@ -453,7 +451,7 @@ def pose_of_mujoco(model: mujoco.MjModel, data: mujoco.MjData, camera_id: int, c
 
 @pytest.mark.parametrize("camera_id", [-1, 0])
 @pytest.mark.parametrize("config", [{}, {"distance": 4.0}, TRACKING])
-def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> None:
+def test_the_camera_has_the_pose_of_gymnasiums(camera_id: int, config: dict[str, object]) -> None:
     model, data = posed(VIEWED)
     viewer = types.SimpleNamespace(
         camera_id=camera_id, default_cam_config=config or None, width=320, height=200
@@ -482,7 +480,7 @@ def test_environments_without_a_size_or_camera_get_defaults() -> None:
     assert (camera.type, camera.distance) == (mujoco.mjtCamera.mjCAMERA_FREE, model.stat.extent)
 
 
-def test_observations_with_sensors(path: Path) -> None:
+def test_sensors_add_their_samples_to_the_observations(path: Path) -> None:
     sensors = {
         "tap": {"geom": "block", "at": [[0.2, 0, 0.1], [-0.2, 0, 0.1]], "rate": 500},
         "sag": {"geom": "block", "at": [0, 0, 0.1], "kind": "height", "rate": 1000},

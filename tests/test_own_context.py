@@ -29,7 +29,7 @@ def keeps(opengl: None, monkeypatch: pytest.MonkeyPatch):
         yield called
 
 
-def test_where_ripples_make_the_first_context(keeps) -> None:
+def test_ripples_that_make_the_first_context_leave_the_programs_context_current(keeps) -> None:
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
     ripples = keeps(lambda: Ripples(model, {"target": Material(density=10.0)}, resolution=8))
@@ -41,7 +41,7 @@ def test_where_ripples_make_the_first_context(keeps) -> None:
         keeps(renderer.close)
 
 
-def test_where_a_renderer_uses_the_first_context(keeps) -> None:
+def test_a_renderer_in_the_first_context_leaves_the_programs_context_current(keeps) -> None:
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -51,5 +51,5 @@ def test_where_a_renderer_uses_the_first_context(keeps) -> None:
     keeps(renderer.close)
 
 
-def test_where_a_report_makes_the_first_context(keeps) -> None:
+def test_a_report_that_makes_the_first_context_leaves_the_programs_context_current(keeps) -> None:
     assert keeps(diagnostics.collect)["opengl"]["renderer"]

@@ -20,7 +20,7 @@ from ripple_sim.sound import DENSITY, RATE, SPEED, Ear, gain, write_wav
 
 
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
-def test_a_piston_on_its_axis(opengl: None, backend: str) -> None:
+def test_a_piston_sounds_on_its_axis_as_theory_says(opengl: None, backend: str) -> None:
     """A sudden velocity v sounds as rho c v until the edge is heard (Stepanishen 1971)."""
     atlas = texel_atlas(disk(24))
     timestep = 2e-5
@@ -145,7 +145,7 @@ def test_partials_of_the_drums_are_at_their_modes(
         assert heard[near].max() > 3 * np.median(heard[(hertz > 0.7 * mode) & (hertz < 1.4 * mode)])
 
 
-def test_the_sound_of_a_video_is_the_given_sound(tmp_path: Path) -> None:
+def test_a_video_carries_the_sound_passed_to_it(tmp_path: Path) -> None:
     sound = 0.5 * np.sin(2 * np.pi * 440 * np.arange(RATE) / RATE)
     clip = Clip(tmp_path / "clip.mp4", H264, Stream(32, 16, 24))
     for _ in range(24):
@@ -179,7 +179,7 @@ def test_a_video_with_sound(opengl: None, tmp_path: Path) -> None:
         render_video(egg_scene(tmp_path), tmp_path / "a.gif", options)
 
 
-def test_wav(tmp_path: Path) -> None:
+def test_a_wav_file_has_its_rate_and_its_samples(tmp_path: Path) -> None:
     pressure = np.array([0.0, 20.0, -40.0])
     write_wav(tmp_path / "a.wav", np.stack([pressure, -pressure], axis=1) * gain(pressure), RATE)
     with wave.open(str(tmp_path / "a.wav")) as file:

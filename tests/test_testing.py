@@ -57,7 +57,7 @@ def test_vertices_of_a_mesh_are_in_the_world_where_its_file_and_the_mjcf_have_th
     np.testing.assert_allclose(waves.from_world(waves.to_world(V, data), data), V, atol=1e-12)
 
 
-def test_targets_follow_the_latest_step_and_so_do_their_copies() -> None:
+def test_targets_and_their_copies_follow_the_latest_step() -> None:
     model = model_of(TURNED_MESH, limbed_asset())
     run = Run(model, "target", resolution=8).until(0.1)
     waves = run.ripples["target"]

@@ -51,7 +51,7 @@ def test_without_a_video_the_data_are_the_same(unbroken, tmp_path):
     assert not (batch.scene(0) / "video.mp4").exists()
 
 
-def test_a_scene_that_is_there_or_being_made_is_left_alone(unbroken, tmp_path):
+def test_finished_scenes_and_scenes_in_the_making_are_not_made_again(unbroken, tmp_path):
     assert make_scene(str(unbroken.path), 0).state == "there"
     batch = new_batch(tmp_path, 'video = "none"\n')
     work = batch.work / "000000"
@@ -143,7 +143,7 @@ def test_a_tar_file_has_the_same_bytes_packed_in_any_steps(packed, tmp_path):
     )
 
 
-def test_a_kill_between_tar_file_and_folders_doubles_nothing(packed, tmp_path, monkeypatch):
+def test_no_scene_is_stored_twice_after_a_kill_during_packing(packed, tmp_path, monkeypatch):
     batch = new_batch(tmp_path, PACKED)
     for number in range(3):
         make_scene(str(batch.path), number)

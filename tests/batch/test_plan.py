@@ -140,7 +140,7 @@ def test_invalid_keys_are_refused(key):
         parse_key(key)
 
 
-def test_the_values_of_a_number_do_not_depend_on_other_variations(tmp_path):
+def test_values_of_a_scene_do_not_depend_on_other_variations(tmp_path):
     few = [Variation(small_plan(tmp_path), number) for number in range(4)]
     more = Variation(
         small_plan(
@@ -181,7 +181,7 @@ def test_values_reach_the_scene_and_the_model(tmp_path):
     assert list(model.geom("grain").rgba) == [0, 1, 0, 1]
 
 
-def test_places_of_one_key_may_have_one_value(tmp_path):
+def test_geoms_that_one_key_names_may_share_one_value(tmp_path):
     _, values = varied(tmp_path, model='"geom[*].friction" = {uniform = [0, 1], together = true}')
     assert len(values) == 3
     assert len(set(values.values())) == 1
@@ -203,9 +203,7 @@ def test_places_of_one_key_may_have_one_value(tmp_path):
     ],
     ids=lambda value: value or "none",
 )
-def test_keys_that_fit_nothing_are_refused_with_the_names_in_the_model(
-    tmp_path, vary, model, message
-):
+def test_unknown_keys_are_refused_with_the_names_in_the_model(tmp_path, vary, model, message):
     with pytest.raises(SceneError, match=message):
         varied(tmp_path, vary, model)
 
@@ -230,7 +228,7 @@ def test_a_drop_scene_takes_keys_of_scene_files_too(tmp_path):
     assert scene.targets[0].material.density > 0
 
 
-def test_the_random_part_of_a_scene_follows_the_number(tmp_path):
+def test_randomisation_of_a_scene_file_depends_on_the_scene_number(tmp_path):
     plan = small_plan(tmp_path)
     scene_file = tmp_path / "scene.toml"
     scene_file.write_text(scene_file.read_text() + "[random]\nposition = 0.1\n")

@@ -134,7 +134,7 @@ def test_a_scene_whose_worker_dies_is_tried_nine_times(here, tmp_path, monkeypat
     assert "its worker died: terminated abruptly" in status_text(tmp_path / "out")
 
 
-def test_a_scene_that_another_process_makes_is_waited_for(here, tmp_path, monkeypatch):
+def test_a_batch_waits_for_a_scene_that_another_process_makes(here, tmp_path, monkeypatch):
     answers = iter(["busy", "busy", "there"])
     monkeypatch.setattr(run, "make_scene", lambda folder, number: Outcome(number, next(answers)))
     plan = small_plan(tmp_path, DATA, PLAN.replace("count = 5", "count = 1"))
@@ -192,7 +192,7 @@ def test_a_changed_plan_is_refused_with_its_changes(tmp_path):
         run_batch(plan, tmp_path / "out")
 
 
-def test_strings_that_are_not_text_are_damage_as_any_other(tmp_path):
+def test_files_that_are_not_utf8_count_as_damaged(tmp_path):
     batch = new_batch(tmp_path)
     batch.note_failure(0, Failure(errors=1, error="it fell"), "log")
     for path, word in ((batch.plan, b"scene"), (batch.failed / "000000.json", b"fell")):
@@ -202,7 +202,7 @@ def test_strings_that_are_not_text_are_damage_as_any_other(tmp_path):
         load_stored(batch.plan)
 
 
-def test_a_key_that_fits_nothing_is_refused_before_the_first_scene(tmp_path):
+def test_an_unknown_key_is_refused_before_the_first_scene(tmp_path):
     with pytest.raises(SceneError, match=r"no geom\[stoone\]"):
         run_batch(
             small_plan(tmp_path, text=PLAN.replace("geom[stone]", "geom[stoone]")), tmp_path / "out"

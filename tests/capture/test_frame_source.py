@@ -97,7 +97,7 @@ def test_depth_of_field_loses_no_light(opengl, make_scene):
 
 
 @pytest.mark.parametrize("transparent", [False, True])
-def test_one_exposure_is_the_plain_frame(opengl, make_scene, transparent):
+def test_a_frame_of_one_exposure_equals_the_plain_frame(opengl, make_scene, transparent):
     plain = last_frame(make_scene(), 2, transparent=transparent)
     single = last_frame(
         make_scene(shutter=180.0, aperture=0.1, exposures=1), 2, transparent=transparent
@@ -127,7 +127,7 @@ def test_shadows_of_many_exposures_are_smoother(opengl, make_scene):
     assert 0 < np.abs(few - many).mean() < 0.5 * np.abs(one - many).mean()
 
 
-def test_overlays_are_laid_over_the_mean(opengl, make_scene, tmp_path):
+def test_overlays_are_drawn_once_over_the_mean_of_the_exposures(opengl, make_scene, tmp_path):
     def render(name: str, **options: Any) -> np.ndarray:
         path = tmp_path / name
         render_video(
@@ -155,7 +155,7 @@ def shrink(picture: np.ndarray, factor: int) -> np.ndarray:
 
 @pytest.mark.parametrize("factor", [1, 2, 3])
 @pytest.mark.parametrize("channels", [3, 4])
-def test_even_areas_keep_their_colour(factor, channels):
+def test_shrinking_keeps_the_colour_of_even_areas(factor, channels):
     # all values survive
     small = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(channels, axis=2)
     small[..., 3:] = 255
@@ -164,7 +164,7 @@ def test_even_areas_keep_their_colour(factor, channels):
     )
 
 
-def test_transparent_pixels_lend_no_colour():
+def test_the_colour_of_transparent_pixels_does_not_count_in_a_mean():
     frame = np.zeros((2, 2, 4), np.uint8)
     frame[0, 0] = (200, 100, 50, 255)
     frame[1, 1] = (0, 255, 0, 0)

@@ -62,7 +62,7 @@ def test_impulses_are_reported_once_since_the_previous_frame(make_scene) -> None
     assert sum(len(each.impulses) for each in shared if each.exposure == 0) == told
 
 
-def test_the_digest_is_the_same_for_the_same_state_and_tells_every_bit(make_scene) -> None:
+def test_the_digest_depends_on_every_bit_of_the_state_and_on_nothing_else(make_scene) -> None:
     scene = make_scene(script=THROW + POKE)
     one = taken(scene, 3)
     same = taken(scene, 3)
@@ -90,7 +90,7 @@ def test_lens_points_fill_the_disc_evenly(count):
         np.testing.assert_allclose(points.T @ points / count, np.eye(2) / 4, atol=0.02)
 
 
-def test_exposures_of_a_camera():
+def test_exposures_are_spread_evenly_over_shutter_time_and_lens():
     assert len(exposures_of(CameraEntry())[0]) == 1
     assert not exposures_of(CameraEntry(shutter=180.0, aperture=0.1, exposures=1))[1].any()
     times, offsets = exposures_of(CameraEntry(shutter=180.0, aperture=0.1, exposures=40))

@@ -34,7 +34,9 @@ from ripple_sim.video import VideoOptions
         ("color", "1, 0,0.25", (1.0, 0.0, 0.25)),
     ],
 )
-def test_a_word_is_read(parse: str, word: str, value: object) -> None:
+def test_a_word_is_converted_to_a_value_of_the_right_type(
+    parse: str, word: str, value: object
+) -> None:
     read = getattr(arguments, f"parse_{parse}")(word)
     assert read == value
     assert type(read) is type(value)
@@ -75,7 +77,7 @@ def test_invalid_words_are_quoted_with_the_expected_ones(
         assert valid in str(refusal.value)
 
 
-def test_names_are_those_of_the_rooms_that_have_them() -> None:
+def test_choices_of_options_are_those_of_the_modules_that_use_them() -> None:
     assert (arguments.UP_AXES, arguments.BASELINES) == (drop.UP_AXES, operators.BASELINES)
     assert tuple(drop_view.VIEWS) == arguments.VIEWS
     assert (arguments.LAYOUTS, arguments.RIMS) == (build.LAYOUTS, plate_rim.RIMS)
@@ -110,7 +112,7 @@ WORDS = {
 COMMANDS = {"render": ("duck", RenderCommand), "drop": ("mesh.obj", DropCommand)}
 
 
-def test_every_option_has_a_word_in_this_test() -> None:
+def test_every_option_is_covered_by_this_file() -> None:
     assert set(WORDS) == {field.name for field in dataclasses.fields(VideoOptions)}
 
 
@@ -168,7 +170,9 @@ def test_the_commands_have_their_own_arguments() -> None:
     assert view.folder == Path()
 
 
-def test_help_is_printed_and_no_command_made(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_prints_every_option_and_returns_no_command(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert parse(["render", "--help"]) is None
     text = capsys.readouterr().out
     assert all(f"--{option.replace('_', '-')}" in text for option in WORDS)

@@ -109,7 +109,7 @@ def test_a_picture_is_written_and_is_not_blank(coarse_pictures, tmp_path, report
         ("no/atlas.png", "folder that exists"),
     ],
 )
-def test_a_picture_without_a_place_is_refused_before_the_mesh_is_read(
+def test_a_picture_that_cannot_be_written_is_refused_before_the_mesh_is_read(
     refusal, monkeypatch, tmp_path, path, said
 ):
     monkeypatch.chdir(tmp_path)

@@ -13,7 +13,7 @@ def plan(tmp_path):
     return path
 
 
-def test_a_dry_run_tells_values_time_and_room_and_leaves_nothing(plan, capsys):
+def test_a_dry_run_prints_values_time_and_disk_space_and_writes_nothing(plan, capsys):
     assert main(["batch", str(plan), "--dry-run", "--workers", "4"]) == 0
     out = capsys.readouterr().out
     assert [line.split(" (scene.toml, seed ")[0] for line in out.splitlines()[:3]] == [

@@ -19,7 +19,7 @@ from ripple_sim.solver.errors import GLError
 
 
 @pytest.mark.parametrize("command", [[], ["render"], ["drop"], ["atlas"], ["info"]])
-def test_help_is_given(capsys, command):
+def test_every_command_prints_its_help(capsys, command):
     assert cli.main([*command, "--help"]) == 0
     out, err = capsys.readouterr()
     assert out.startswith(" ".join(["usage: ripple-sim", *command]))
@@ -105,7 +105,7 @@ def test_a_missing_folder_is_refused_before_the_viewer_opens(refusal):
     )
 
 
-def test_a_device_that_is_not_there_is_a_failure_in_one_line(tmp_path, monkeypatch, capsys):
+def test_a_missing_device_is_an_error_of_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("ripple_sim.solver.gl.context._selected", None)  # put back after the test
     assert cli.main(["render", "sphere", "-o", str(tmp_path / "clip.mp4"), "--device", "77"]) == 1
     assert re.fullmatch(r"ripple-sim: no OpenGL .* on EGL device 77 .*\n", capsys.readouterr().err)
@@ -165,7 +165,7 @@ def test_the_exit_status_is_2_for_bad_input_and_1_for_other_errors(
     ("words", "need"),
     [("render duck -o x.mp4", 2.4), ("export duck -o x.usda", 3.0), ("atlas a.obj", 1.2)],
 )
-def test_little_address_space_is_reported_at_once_with_the_need(tmp_path, words, need):
+def test_too_little_address_space_is_reported_at_the_start(tmp_path, words, need):
     """Later OpenBLAS, LLVM or Mesa run out of it, and end the process or blame something else."""
     code = f"ulimit -v 800000; {sys.executable} -m ripple_sim {words}"
     result = subprocess.run(
@@ -209,7 +209,7 @@ def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(
     assert (result.returncode, result.stderr) == (status, f"ripple-sim: {word}\n")
 
 
-def test_a_warning_is_one_line_and_the_handler_is_given_back(monkeypatch, capsys):
+def test_a_warning_is_one_line_and_the_handler_is_restored(monkeypatch, capsys):
     def run(self):
         warnings.warn("the hull is\noff the surface", RippleWarning, stacklevel=1)
 
@@ -252,7 +252,7 @@ LONG = "a" * 5000
         (["bench", LONG], "File name too long"),
     ],
 )
-def test_strange_words_are_refused_in_a_line(
+def test_strange_arguments_are_refused_in_one_line(
     refusal, tmp_path, monkeypatch, tetrahedron, argv, named
 ):
     monkeypatch.chdir(tmp_path)

@@ -43,7 +43,7 @@ def test_our_own_output_is_replaced_by_the_next_job(tmp_path: Path, ending: str)
     assert [each.name for each in tmp_path.iterdir()] == [made.name]
 
 
-def test_exr_frames_are_known_again(tmp_path: Path) -> None:
+def test_exr_frames_are_recognised_as_our_own(tmp_path: Path) -> None:
     pytest.importorskip("OpenEXR")
     for _ in range(2):
         with open_writer(tmp_path / "frames", **SIZE, frame_format="exr") as writer:
@@ -119,7 +119,7 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["run.usda", "run.usdc", "run.csv"])
-def test_an_export_goes_through_no_link_to_another_ending(tmp_path: Path, name: str) -> None:
+def test_an_export_through_a_link_to_another_ending_is_refused(tmp_path: Path, name: str) -> None:
     link = tmp_path / name
     # USD would write it to a name of the ending's beside, and that was lost
     for target in ("nowhere", "run.mp4"):
@@ -201,7 +201,7 @@ def test_an_atlas_replaces_an_older_one_and_goes_through_links(tmp_path: Path) -
         (".png", lambda path: check_plot_path(path, False)),
     ],
 )
-def test_names_that_cannot_be_are_refused_before_work_begins(
+def test_impossible_file_names_are_refused_before_work_begins(
     tmp_path: Path, ending: str, check, kind: str
 ):
     path = tmp_path / (

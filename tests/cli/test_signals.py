@@ -69,7 +69,7 @@ def test_a_signal_that_the_parent_ignores_stays_ignored(number: int, take: objec
     signal.raise_signal(number)  # nothing happens
 
 
-def test_an_import_is_waited_for(tmp_path: Path) -> None:
+def test_a_signal_during_an_import_is_raised_after_the_import(tmp_path: Path) -> None:
     """An export that was interrupted while it imported its writer left a hidden folder behind."""
     (tmp_path / "slow.py").write_text(
         "import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\nprint('imported')\n"
@@ -84,7 +84,7 @@ def test_an_import_is_waited_for(tmp_path: Path) -> None:
     assert ended(program)[:2] == (128 + signal.SIGTERM, "imported\ncleaned up\n")
 
 
-def test_the_rule_holds_from_the_first_import_on() -> None:
+def test_signals_end_the_program_in_good_order_during_its_first_imports() -> None:
     program = (
         "import signal, sys\n"
         "class Meanwhile:\n"
@@ -96,7 +96,7 @@ def test_the_rule_holds_from_the_first_import_on() -> None:
     assert ended(program) == (128 + signal.SIGHUP, "", "ripple-sim: hung up\n")
 
 
-def test_after_the_command_while_the_interpreter_shuts_down_its_status_stands() -> None:
+def test_signals_during_shutdown_do_not_change_the_exit_status() -> None:
     program = (
         "import os\nimport ripple_sim.__main__\n"
         "class Last:\n"
@@ -126,7 +126,7 @@ def within(module: str, number: int, function: str = "call") -> list[str]:
 
 
 @pytest.mark.parametrize("number", ALL)
-def test_no_exception_is_raised_within_a_call_of_moderngls_but_soon_after(number: int) -> None:
+def test_a_signal_is_raised_only_after_calls_of_fragile_libraries_have_ended(number: int) -> None:
     import moderngl
     from llvmlite.binding import ffi
     from pyvista.plotting import render_window_interactor
@@ -188,7 +188,7 @@ def run(
         ("--help", "| head -c 0", 0),
     ],
 )
-def test_closed_and_full_streams(
+def test_closed_and_full_streams_give_the_right_exit_status_without_a_message(
     tmp_path: Path, words: str, redirections: str, status: int
 ) -> None:
     result = run(tmp_path, words, redirections)
@@ -206,7 +206,7 @@ def test_without_streams_home_and_cache_an_atlas_is_whole(
     assert sorted(each.name for each in tmp_path.iterdir()) == ["mesh.npz", tetrahedron.name]
 
 
-def test_a_full_disk_is_no_bad_input(tmp_path, monkeypatch, capsys, tetrahedron) -> None:
+def test_the_exit_status_on_a_full_disk_is_1(tmp_path, monkeypatch, capsys, tetrahedron) -> None:
     def full(file: BinaryIO, *_: object) -> None:
         file.write(b"half")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

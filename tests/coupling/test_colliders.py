@@ -24,7 +24,7 @@ def spec_of(V: np.ndarray, F: np.ndarray) -> mujoco.MjSpec:
     return spec
 
 
-def test_body_comes_down_on_the_surface_that_the_route_promises() -> None:
+def test_a_body_lands_on_the_surface_that_the_collider_promises() -> None:
     # the waist of the peanut, 0.045 m below its hull
     V, F = peanut(0.04)
     waist = V[np.abs(V[:, 0]) < 0.03][:, 2].max()
@@ -65,7 +65,7 @@ def test_routes_agree_where_the_hull_is_the_surface(
 
 @pytest.mark.parametrize("route", ["auto", "flex", "convex"])
 @pytest.mark.parametrize("earlier", ["flex", "hull"])
-def test_a_route_that_fails_leaves_the_earlier_one(earlier: str, route: str) -> None:
+def test_the_earlier_collider_stays_if_a_new_one_fails(earlier: str, route: str) -> None:
     V, F = peanut(0.1)
     spec = mesh_spec((V, F[:-40]), route=earlier)  # open: it has no convex parts
     if route != "convex":
@@ -151,7 +151,7 @@ def test_inset_moves_the_planes_of_a_box_and_not_its_shape() -> None:
     np.testing.assert_allclose(inner.max(axis=1), 0.0, atol=2e-4)
 
 
-def test_sides_of_a_thin_part_do_not_change_places() -> None:
+def test_inset_sides_of_a_thin_part_do_not_cross() -> None:
     V, F = solid((0.5, 0.4, 0.01), 0.05)
     mesh = Mesh.from_arrays(V, F)
     moved = inset(mesh, 0.03)
@@ -188,7 +188,7 @@ def test_geom_keeps_its_mass_and_gives_its_contacts_to_the_flex() -> None:
     )
 
 
-def test_bodies_and_worlds_without_a_name_will_do() -> None:
+def test_colliders_work_on_bodies_without_a_name() -> None:
     V, F = peanut(0.06)
     spec = mujoco.MjSpec()
     spec.add_mesh(name="shape", uservert=V.ravel(), userface=F.ravel())
@@ -199,7 +199,7 @@ def test_bodies_and_worlds_without_a_name_will_do() -> None:
     assert find_flex_colliders(model) == {model.geom("a").id: 0, model.geom("b").id: 1}
 
 
-def test_flex_that_cannot_be_made_is_refused() -> None:
+def test_a_flex_that_cannot_be_compiled_is_refused_with_the_reason() -> None:
     spec = mesh_spec(peanut(0.06), route=None)
     spec.compiler.discardvisual = True
     with pytest.raises(SceneError, match="discardvisual = False"):

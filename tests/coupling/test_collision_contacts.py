@@ -39,7 +39,7 @@ def test_contact_with_a_thin_part_is_placed_on_its_own_side(
     assert off.max() < (1e-6 if nearer else 1.5 * np.sqrt(plate.areas.max()))
 
 
-def test_point_is_the_nearest_of_all_that_face_the_contact(animal: Atlas) -> None:
+def test_a_contact_is_placed_at_the_nearest_point_that_faces_it(animal: Atlas) -> None:
     rng = np.random.default_rng(4)
     positions = animal.positions.reshape(-1, 3)
     outward = animal.normals.reshape(-1, 3)
@@ -57,7 +57,7 @@ def test_point_is_the_nearest_of_all_that_face_the_contact(animal: Atlas) -> Non
         assert np.linalg.norm(positions[there] - place) < texel
 
 
-def test_where_nothing_faces_a_contact_the_nearest_point_is_taken() -> None:
+def test_a_contact_that_no_point_faces_is_placed_at_the_nearest_point() -> None:
     atlas = sphere_atlas(1.0, 8)
     [place] = places_facing(atlas, np.array([[0.0, 0.0, 1.1]]), np.zeros((1, 3)))
     np.testing.assert_allclose(place, [0, 0, 1], atol=0.02)
@@ -89,7 +89,7 @@ def slab(offset: float, body: str = "") -> mujoco.MjModel:
 
 
 @pytest.mark.parametrize("offset", [-0.03, 0.0, 0.03])
-def test_visible_plate_is_loaded_on_the_side_that_is_hit_with_all_that_the_ball_loses(
+def test_a_visible_plate_gets_the_whole_momentum_on_the_side_that_is_hit(
     offset: float,
 ) -> None:
     """The lower side is nearer to a core that lies low.
@@ -133,7 +133,7 @@ def test_a_plank_across_two_targets_presses_on_both_with_its_weight() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:geom .* collides as")
-def test_named_geoms_alone_load_a_target_that_names_them() -> None:
+def test_a_target_with_named_contacts_is_loaded_by_these_geoms_alone() -> None:
     arm = ARM.replace("</body>", '<geom name="knob" size="0.12" pos="0.4 0 0"/></body>')
     model = model_of(arm + BALL.format("0.4 0.01 0.8"))
     bone, lost = play(model, ("left",), contacts=["bone"])
@@ -142,7 +142,7 @@ def test_named_geoms_alone_load_a_target_that_names_them() -> None:
     assert knob.given() == pytest.approx(lost, rel=0.01)
 
 
-def test_two_links_that_are_only_visible_hit_each_other_with_one_momentum() -> None:
+def test_two_visible_targets_that_hit_each_other_get_equal_momentum() -> None:
     fist = f"""<body name="ball" pos="0.3 0 0.8"><freejoint/>
     <geom name="fist" size="0.06" {SEEN} mass="0"/>
         <geom name="core" size="0.05" mass="{MASS}"/></body>"""
@@ -152,7 +152,7 @@ def test_two_links_that_are_only_visible_hit_each_other_with_one_momentum() -> N
 
 
 @pytest.mark.filterwarnings("ignore:geom .* collides as")
-def test_collision_geom_with_a_flex_collider_and_the_target_that_it_stands_for() -> None:
+def test_a_visible_target_is_loaded_through_the_flex_of_its_collision_geom() -> None:
     """A visible ball around an animal that collides through a flex."""
     spec = mujoco.MjSpec.from_string(
         f"""<mujoco><option timestep="0.001"/><asset>{mesh_asset("animal", *limbed(0.05))}</asset>
@@ -179,7 +179,7 @@ def test_surface_that_is_only_visible_pushes_back() -> None:
     assert heights[True] > heights[False] + 0.002
 
 
-def test_hull_over_a_waist_is_as_far_off_as_the_waist_is_deep() -> None:
+def test_the_gap_of_a_hull_is_the_depth_of_the_waist() -> None:
     V, F = peanut(0.03)
     widest = np.hypot(V[:, 1], V[:, 2]).max()
     waist = np.hypot(V[:, 1], V[:, 2])[np.abs(V[:, 0]) < 0.01].min()
@@ -282,7 +282,7 @@ def test_warning_about_a_target_that_nothing_can_touch(
         ('<geom name="core" type="hfield" hfield="flat" pos="0 0 0.29"/>', None),
     ],
 )
-def test_collision_geoms_off_the_surface_are_warned_of(core: str, gap: float | None) -> None:
+def test_warning_about_collision_geoms_away_from_the_surface(core: str, gap: float | None) -> None:
     link = LINK.format(f'<geom name="shell" size="0.3" {SEEN}/>{core}')
     model = model_of(link, '<hfield name="flat" nrow="2" ncol="2" size="1 1 0.1 0.1"/>')
     target = Target(contacts=["core"] if "plane" in core or "hfield" in core else None)
@@ -297,7 +297,7 @@ def test_collision_geoms_off_the_surface_are_warned_of(core: str, gap: float | N
     )
 
 
-def test_sdf_geoms_that_height_fields_let_through_are_warned_of() -> None:
+def test_warning_about_sdf_geoms_that_fall_through_height_fields() -> None:
     spec = mesh_spec(peanut(0.06), "free", "sdf")
     spec.add_hfield(name="hills", nrow=2, ncol=2, size=[1, 1, 0.1, 0.1], userdata=[0, 1, 1, 0])
     spec.worldbody.add_geom(name="hills", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="hills")

@@ -136,7 +136,7 @@ def test_a_body_at_rest_on_a_flex_and_a_geom_presses_with_its_weight() -> None:
     np.testing.assert_allclose(push, [0, 0, -2 * 9.81], atol=0.02)
 
 
-def test_a_flex_that_does_not_ripple_goes_by_its_geom() -> None:
+def test_contacts_of_a_flex_collider_that_does_not_ripple_count_for_its_geom() -> None:
     model = slab_and_table("", slab='pos="0.6 0 0.41"')
     [(target, contacts)] = reader_of(model, "table").read(after(model, 600)).items()
     assert (target, set(contacts.others.tolist())) == (

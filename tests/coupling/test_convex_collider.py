@@ -28,9 +28,7 @@ def ell() -> tuple[np.ndarray, np.ndarray]:
     return solid.subdivide_to_size(0.1).vertices, solid.subdivide_to_size(0.1).faces
 
 
-def test_parts_fill_the_solid_are_the_same_each_time_and_come_from_the_cache(
-    tmp_path, monkeypatch
-) -> None:
+def test_convex_parts_fill_the_solid_are_reproducible_and_cached(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     mesh = Mesh.from_arrays(*ell())
     first = convex_parts(mesh)
@@ -60,7 +58,7 @@ def test_a_missing_package_is_named_with_the_way_to_install_it(monkeypatch) -> N
         make_collidable(mesh_spec(WAIST, route=None), "target", "convex")
 
 
-def test_the_geom_keeps_mass_and_looks_and_its_parts_collide_like_it() -> None:
+def test_the_geom_keeps_its_mass_and_looks_and_convex_parts_inherit_its_contacts() -> None:
     settings = {
         "friction": [0.3, 0.01, 0.001],
         "solref": [0.015, 0.7],
@@ -88,7 +86,7 @@ def test_the_geom_keeps_mass_and_looks_and_its_parts_collide_like_it() -> None:
 
 @pytest.mark.parametrize("route", ["sdf", "flex", "hull", "convex"])
 @pytest.mark.parametrize("earlier", ["convex", "flex"])
-def test_another_route_undoes_this_one(earlier: str, route: str) -> None:
+def test_a_new_collider_replaces_the_earlier_one_completely(earlier: str, route: str) -> None:
     def content(spec: mujoco.MjSpec) -> list[object]:
         model = spec.compile()
         arrays = model.geom_type, model.geom_contype, model.geom_conaffinity, model.geom_pos

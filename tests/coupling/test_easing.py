@@ -26,7 +26,7 @@ def taken_up(forces: list[float], collider: int = 1, easing: Easing | None = Non
     )
 
 
-def test_light_hits_and_weights_are_taken_up_whole() -> None:
+def test_easing_leaves_light_hits_and_weights_unchanged() -> None:
     # 0.2 N s, at a rate of 50 a second as much as 10 N, less what fades
     hit = [100.0] * 2 + [0.0] * 50
     np.testing.assert_array_equal(taken_up(hit), hit)
@@ -34,7 +34,7 @@ def test_light_hits_and_weights_are_taken_up_whole() -> None:
     np.testing.assert_array_equal(taken_up(weight), weight)
 
 
-def test_a_heavy_hit_gives_as_much_as_the_hardest_that_is_taken_up_whole() -> None:
+def test_easing_limits_the_impulse_of_any_heavy_hit_to_the_same_value() -> None:
     impulses = [DT * taken_up([force] * 5).sum() for force in (1e3, 1e4, 1e6)]
     # the most over the rate, and what fades in five steps
     assert impulses == pytest.approx([LAW.most / LAW.rate] * 3, rel=0.3)
@@ -42,7 +42,7 @@ def test_a_heavy_hit_gives_as_much_as_the_hardest_that_is_taken_up_whole() -> No
     assert taken_up([1e6] * 500)[-1] == pytest.approx(LAW.most)
 
 
-def test_each_body_has_its_own_and_a_pause_gives_it_back() -> None:
+def test_each_body_is_eased_separately_and_recovers_during_a_pause() -> None:
     easing = Easing(LAW, BODIES, ATLAS)
     colliders = np.array([0, 1, 2, 3])
     texels = np.zeros(4, np.int64)
@@ -60,7 +60,7 @@ def test_pulling_counts_as_pushing() -> None:
     np.testing.assert_allclose(taken_up([-1e5] * 9), -taken_up([1e5] * 9))
 
 
-def test_the_law_dents_by_its_share_of_the_thickness() -> None:
+def test_the_greatest_eased_force_dents_a_fixed_share_of_the_thickness() -> None:
     of = {"radius": 0.05, "density": 30.0, "speed": 2.0, "stiffness": 900.0}
     law = EasingLaw.of(0.2, 0.3, **of)
     assert depth_under(law.most, **of) == pytest.approx(0.06)

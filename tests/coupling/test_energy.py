@@ -144,7 +144,9 @@ def test_the_surface_gains_the_momentum_that_the_body_loses() -> None:
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast"])
-def test_velocities_change_as_the_step_would_have_changed_them(integrator: str) -> None:
+def test_taking_contact_forces_back_gives_the_velocities_of_a_step_without_them(
+    integrator: str,
+) -> None:
     """Of a body that spins, over a hinge with damping, when its contact forces are taken back."""
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.002" integrator="{integrator}"/><worldbody>

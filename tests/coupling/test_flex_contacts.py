@@ -233,7 +233,7 @@ def loads_of(slab: Slab, contacts: list[tuple], surface: tuple[float, ...] | Non
 RIM = [(UP, (0, 0, 3)), (ASIDE, (50, 0, 1)), ((-1, 0, 0), (-50, 0, 2))]
 
 
-def test_friction_of_contacts_that_push_sideways_counts_along_the_normal(slab: Slab) -> None:
+def test_friction_of_sideways_contacts_counts_along_the_surface_normal(slab: Slab) -> None:
     """Opposite contacts at a rim cancel along x; their friction pushes upwards, 3 + 1 + 2 N."""
     # without the surface's normal all three contacts count with their own normals
     assert loads_of(slab, RIM, surface=None).kept.all()

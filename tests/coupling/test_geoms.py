@@ -62,7 +62,7 @@ def test_a_geom_with_two_values_is_refused() -> None:
         coupling.by_name(model, {"chest": 1, 1: 2}, "numbers")
 
 
-def test_targets_go_by_name_or_id_or_place() -> None:
+def test_targets_are_chosen_by_name_by_id_or_by_place_on_a_body() -> None:
     """Ids and unnamed geoms once ended in a TypeError, or could not be asked for."""
     model = model_of(
         '<geom size="0.5"/><body name="b" pos="0.1 0 0.53"><freejoint/><geom size="0.05"/></body>'
@@ -124,7 +124,7 @@ def model() -> mujoco.MjModel:
         (("wall",), {}, [["wall"]]),
     ],
 )
-def test_colliders_of_targets(model, targets, contacts, expected) -> None:
+def test_collision_geoms_of_targets_are_found(model, targets, contacts, expected) -> None:
     ids = [find_geom(model, name) for name in targets]
     coupled = CoupledModel(model, ids, coupling.named_collision_geoms(model, targets, contacts))
     assert [
@@ -227,7 +227,7 @@ def test_invalid_places_and_keys_are_named(call, message: str) -> None:
         ("0 0 2", "0 0 3", "body_pos"),
     ],
 )
-def test_data_of_a_model_compiled_with_another_number_is_refused(
+def test_data_of_a_model_with_another_number_of_elements_is_refused(
     before: str, after: str, what: str
 ) -> None:
     other = model_of(SCENE.replace(before, after))
@@ -254,7 +254,7 @@ def test_data_of_a_model_compiled_with_another_number_is_refused(
         "pickled model",
     ],
 )
-def test_data_of_a_copy_is_as_good_as_the_model_s_own(make) -> None:
+def test_data_of_a_copied_model_is_accepted(make) -> None:
     model = model_of(SCENE)
     begun(model).mj_step(make(model))
 
@@ -320,7 +320,7 @@ def test_geoms_collide_if_either_mask_allows_it_and_never_on_one_body(
     assert not coupled.can_collide(pebble).any()
 
 
-def test_flex_of_another_name_body_or_kind_stands_for_nothing() -> None:
+def test_a_flex_of_another_name_body_or_kind_is_no_collider() -> None:
     V, F = peanut(0.06)
     mesh = {"vert": V.ravel(), "elem": F.ravel()}
     spec = mesh_spec((V, F), route=None)

@@ -111,7 +111,7 @@ def test_a_ball_on_a_heavy_target_has_the_duration_and_the_peak_of_hertz(modulus
     assert run.total == pytest.approx(2 * MASS * SPEED, rel=0.02)
 
 
-def test_the_peak_of_an_inelastic_hit_is_as_much_lower_as_its_impulse():
+def test_the_peak_of_an_inelastic_hit_is_lower_in_proportion_to_its_impulse():
     """By MuJoCo's default a ball gets a seventh of its speed back."""
     run = Fall(height=0.121, modulus=1e8, speed=SPEED).steps(8)
     share = run.total / (2 * MASS * SPEED)

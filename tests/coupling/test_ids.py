@@ -40,7 +40,7 @@ def test_targets_follow_the_geoms_and_the_vertices_of_flexes(model: mujoco.MjMod
     assert target_of_skin(model, 0) == targets[3]
 
 
-def test_each_collider_belongs_to_the_geom_flex_or_skin_of_its_numbering(
+def test_every_collider_id_leads_to_its_geom_flex_or_skin(
     model: mujoco.MjModel,
 ) -> None:
     coupled = CoupledModel(model)

@@ -65,7 +65,9 @@ def given_until_over(load: TargetLoad) -> float:
 
 
 @pytest.mark.parametrize("elapsed", [DT, 3 * DT, DT / 2])
-def test_a_step_gives_the_contacts_impulse_however_much_time_has_passed(elapsed: float) -> None:
+def test_a_step_gives_the_whole_impulse_of_its_contacts_for_any_elapsed_time(
+    elapsed: float,
+) -> None:
     pose = tilted()
     contacts = contacts_on(pose, {1: [(POLE, 5.0)], 3: [(SIDE, 2.0), (CORNER, 1.0)]})
     load, _ = sphere_load().touched(contacts, pose, DT, elapsed)
@@ -74,7 +76,7 @@ def test_a_step_gives_the_contacts_impulse_however_much_time_has_passed(elapsed:
 
 
 @pytest.mark.parametrize("steps", [3, 40, 400])
-def test_after_all_geoms_have_left_the_whole_impulse_has_been_given(steps: int) -> None:
+def test_the_whole_impulse_has_been_given_when_all_geoms_have_left(steps: int) -> None:
     rng = np.random.default_rng(steps)
     pose = tilted()
     load = sphere_load()
@@ -132,7 +134,7 @@ def record_of(each: dict = EACH, elapsed: float = DT) -> tuple[StepContacts, Pos
 
 
 @pytest.mark.parametrize("elapsed", [DT, 4 * DT])
-def test_there_is_one_impulse_for_each_geom_however_its_load_is_spread_over_time(
+def test_each_geom_has_one_impulse_for_any_spread_of_its_load_over_time(
     elapsed: float,
 ) -> None:
     impulses = list(record_of(elapsed=elapsed)[0].impulses(*TOLD))

@@ -65,7 +65,7 @@ def wrapped(ripples: Ripples, model: mujoco.MjModel, data: mujoco.MjData) -> Non
 
 @pytest.mark.parametrize("two_way", [False, True])
 @pytest.mark.parametrize("loop", [own_steps, in_halves, followed, wrapped])
-def test_every_loop_makes_the_waves_of_the_plain_one(loop: Loop, two_way: bool) -> None:
+def test_every_loop_makes_the_waves_of_the_plain_loop(loop: Loop, two_way: bool) -> None:
     expected = bounce(two_way=two_way)
     found = bounce(two_way=two_way)
     with warnings.catch_warnings(action="error", category=RippleWarning):
@@ -78,7 +78,7 @@ def test_every_loop_makes_the_waves_of_the_plain_one(loop: Loop, two_way: bool) 
 
 
 @pytest.mark.parametrize("loop", [own_steps, followed])
-def test_impulses_of_several_steps_are_those_of_each(loop: Loop) -> None:
+def test_impulses_of_several_steps_add_up_to_the_momentum_gained(loop: Loop) -> None:
     ripples, model, data = bounce()
     given = 0.0
     for _ in range(30):
@@ -104,7 +104,7 @@ def test_one_warning_counts_missed_steps() -> None:
     assert ripples["block"].time == pytest.approx(data.time - 4 * model.opt.timestep)
 
 
-def test_mujocos_functions_are_its_own_again() -> None:
+def test_mujocos_functions_are_restored_after_following() -> None:
     ripples, model, data = bounce()
     before = mujoco.mj_step, mujoco.mj_step2
     with pytest.raises(ZeroDivisionError), ripples.following(data):
@@ -115,7 +115,7 @@ def test_mujocos_functions_are_its_own_again() -> None:
     assert (mujoco.mj_step, mujoco.mj_step2) == before
 
 
-def test_only_the_data_that_is_followed_is() -> None:
+def test_following_one_data_ignores_steps_of_others() -> None:
     ripples, model, data = bounce()
     other = mujoco.MjData(model)
     with ripples.following(data):
@@ -124,7 +124,7 @@ def test_only_the_data_that_is_followed_is() -> None:
     assert ripples["block"].time == 0
 
 
-def test_forces_that_are_not_solved_yet_are_solved_for() -> None:
+def test_forces_are_solved_if_mujoco_has_not_solved_them_yet() -> None:
     """dm_control's loop ends with mj_step1, so the contacts are those of the next step."""
     ripples, model, data = bounce()
     given = 0.0
@@ -281,7 +281,7 @@ def said_by(run: Callable[[], None]) -> list[str]:
 
 
 @pytest.mark.parametrize("copied", [False, True])
-def test_one_warning_about_two_data_in_turn(copied: bool) -> None:
+def test_warning_about_two_data_stepped_in_turn(copied: bool) -> None:
     """Copies carry the mark of what they were copied from, and others marks of their own."""
     ripples, model, data = bounce()
     ripples.mj_step(data)
@@ -298,7 +298,7 @@ def test_one_warning_about_two_data_in_turn(copied: bool) -> None:
     assert said_by(in_turn) == []
 
 
-def test_data_of_one_simulation_are_not_warned_of() -> None:
+def test_no_warning_about_several_data_of_one_simulation() -> None:
     """A new MjData each episode, one that is reset, and two that take turns."""
     ripples, model, first = bounce()
     second = mujoco.MjData(model)
@@ -318,7 +318,7 @@ def test_data_of_one_simulation_are_not_warned_of() -> None:
 
 @pytest.mark.parametrize("flag", ["contact", "constraint"])
 @pytest.mark.parametrize("at_run_time", [False, True])
-def test_contacts_that_the_model_disables_are_warned_of(flag: str, at_run_time: bool) -> None:
+def test_warning_about_contacts_that_the_model_disables(flag: str, at_run_time: bool) -> None:
     ripples, model, data = bounce()
     bit = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}"))
     if at_run_time:

@@ -324,7 +324,7 @@ PLATE_CASES = BENCHMARK["CASES"]
 
 @pytest.mark.filterwarnings("ignore:the waves on geom")
 @pytest.mark.parametrize("name", PLATE_CASES)
-def test_the_surface_of_a_plate_receives_what_the_plate_gains(name: str) -> None:
+def test_the_waves_on_a_plate_get_the_momentum_that_the_plate_gets(name: str) -> None:
     gained, given = BENCHMARK["measure"](PLATE_CASES[name])
     assert gained > 0.1
     assert given == pytest.approx(gained, rel=0.01)

@@ -41,7 +41,7 @@ def test_force_and_torque_are_preserved(block: Atlas, seed: int) -> None:
     np.testing.assert_allclose(forces @ points, loads @ corners, atol=1e-12)
 
 
-def test_no_force_where_the_surface_is_not() -> None:
+def test_distant_contacts_do_not_load_the_surface_between_them() -> None:
     """Two contacts, on the head and the rump, load these two and not the saddle between them."""
     V, F = limbed(0.05)
     animal = build_atlas(Mesh.from_arrays(V, F), 16, cache=False)
@@ -94,7 +94,7 @@ def test_patches_do_not_depend_on_one_another(block: Atlas, seed: int) -> None:
         np.testing.assert_allclose(together[2][mine], radius)
 
 
-def test_footprints_under_many_points_are_those_of_each() -> None:
+def test_footprints_of_many_points_equal_footprints_of_single_points() -> None:
     animal = build_atlas(Mesh.from_arrays(*limbed(0.05)), 24, cache=False)
     rng = np.random.default_rng(2)
     areas = animal.areas.reshape(-1)

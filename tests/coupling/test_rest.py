@@ -366,7 +366,7 @@ def forces_of(geoms: list[int], texels: list[np.ndarray], forces: list[np.ndarra
     )
 
 
-def test_geoms_are_filtered_each_for_itself() -> None:
+def test_each_geom_is_filtered_independently() -> None:
     """Three geoms that come and go, together and alone."""
     size = 96
     dt = 0.002

@@ -45,7 +45,7 @@ def row(ripples: Ripples, data: mujoco.MjData, name: str = "rim", steps: int = S
 
 
 @pytest.mark.parametrize("kind", ["acceleration", "velocity"])
-def test_sensordata_is_what_a_sensor_reads_late_by_its_latency(kind: str) -> None:
+def test_sensordata_holds_the_readings_of_the_sensor_delayed_by_its_latency(kind: str) -> None:
     model = specification(kind=kind).compile()
     data = mujoco.MjData(model)
     ripples = rippling(model)
@@ -76,7 +76,7 @@ def test_samples_outlive_mj_forward_and_a_reset_empties_them() -> None:
     np.testing.assert_array_equal(row(ripples, data), first)
 
 
-def test_a_missed_step_moves_no_later_sample() -> None:
+def test_a_missed_step_does_not_shift_later_samples() -> None:
     model = specification().compile()
     data = mujoco.MjData(model)
     ripples = rippling(model)
@@ -91,7 +91,7 @@ def test_a_missed_step_moves_no_later_sample() -> None:
     assert samples.any()
 
 
-def test_a_changed_time_step_is_told_of_once_and_blocks_end_at_the_latest_sample() -> None:
+def test_one_warning_about_a_changed_time_step_and_blocks_end_at_the_latest_sample() -> None:
     model = specification().compile()
     data = mujoco.MjData(model)
     ripples = rippling(model)
@@ -133,7 +133,7 @@ def test_sensors_survive_xml_and_attach() -> None:
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
-def test_a_copy_begins_a_new_row_and_ends_on_the_same_samples(copied) -> None:
+def test_a_copy_starts_an_empty_row_and_reaches_the_same_samples(copied) -> None:
     model = specification().compile()
     data = mujoco.MjData(model)
     ripples = rippling(model)
@@ -148,7 +148,7 @@ def test_a_copy_begins_a_new_row_and_ends_on_the_same_samples(copied) -> None:
     )
 
 
-def test_a_sensor_on_what_does_not_ripple_is_told_of_and_stays_0() -> None:
+def test_a_sensor_on_a_geom_without_ripples_warns_and_reads_0() -> None:
     model = specification(geom="ball", site="off").compile()
     with pytest.warns(RippleWarning, match="'rim' is on 'ball', which does not ripple"):
         ripples = rippling(model)

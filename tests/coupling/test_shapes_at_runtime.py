@@ -84,7 +84,7 @@ def test_two_way_coupling_and_pickled_copies_continue_after_a_change():
 
 
 @pytest.mark.parametrize("what", ["held still", "texel by texel", "sensors"])
-def test_a_changed_surface_is_refused_if_something_belongs_to_its_texels(what):
+def test_a_changed_surface_is_refused_if_sensors_or_maps_refer_to_its_texels(what):
     model, data, ripples = made("ball")
     if what == "sensors":
         ripples["ball"].sensor([0.0, 0.0, 0.2], kind="acceleration", rate=1000)
@@ -120,7 +120,7 @@ def test_a_changed_surface_is_drawn_where_it_is_now_with_its_waves():
 
 
 @pytest.mark.filterwarnings("ignore:no wave", "ignore:the surface of")
-def test_a_rippling_height_field_has_its_walls_as_one_that_does_not():
+def test_a_rippling_height_field_is_drawn_with_its_walls():
     model, data, ripples = made("terrain")
     model.hfield_data[:] = 0.8
     depths = []

@@ -50,7 +50,7 @@ def play(spec: mujoco.MjSpec, seconds: float) -> tuple[Run, float]:
 
 
 @pytest.mark.parametrize("kind", ["2", "3"])
-def test_cloth_and_soft_cube_give_a_flat_top_all_the_momentum_that_they_lose(kind: str) -> None:
+def test_soft_bodies_give_a_flat_top_their_whole_momentum(kind: str) -> None:
     """37,103 contacts of a cloth once gave nothing."""
     run, told = play(draped(BOX, kind=kind), 0.3)
     assert run.pairs == {("target", "cloth")}
@@ -113,7 +113,7 @@ def test_risen_surface_pushes_a_cloth_up() -> None:
     assert heights[1] > heights[0] + 0.002
 
 
-def test_passive_contacts_which_tell_no_force_are_warned_of() -> None:
+def test_warning_about_passive_contacts_without_forces() -> None:
     spec = draped(BOX, contact='passive="true"', integrator="discrete")
     with pytest.warns(
         RippleWarning, match="passive contacts of flex 'cloth', under which geom 'target' will"

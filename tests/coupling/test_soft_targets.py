@@ -105,7 +105,7 @@ HAMMOCK = f"""<mujoco>{HEAD}<worldbody>
 </worldbody></mujoco>"""
 
 
-def test_a_cloth_that_wraps_round_a_ball_is_pressed_by_more_than_the_ball_loses(recwarn):
+def test_a_cloth_around_a_ball_is_pressed_by_more_than_the_lost_momentum(recwarn):
     """Forces on slopes cancel as vectors; the surface gets the sum of the normal forces."""
     run = begun(HAMMOCK, "cloth")
     model = run.model
@@ -150,7 +150,7 @@ def test_a_skin_follows_its_bones():
     assert_allclose(after[far][:, 1], before[far][:, 0], atol=2e-3)
 
 
-def test_names_that_no_surface_has_are_refused():
+def test_unknown_soft_targets_and_unsupported_options_are_refused():
     model = mujoco.MjModel.from_xml_string(JELLY)
     with pytest.raises(SceneError, match="its flexes and skins are 'jelly'"):
         Ripples(model, {"jam": SOFT})
@@ -175,7 +175,7 @@ def test_open_coefficients_are_chosen_by_the_model():
     assert waves.material.speed > 1
 
 
-def test_a_geom_moved_by_hand_takes_its_contacts_along():
+def test_contacts_follow_a_surface_that_is_moved_by_hand():
     model = mujoco.MjModel.from_xml_string(
         """<mujoco><worldbody><geom name="target" type="sphere" size=".2"/>
         <body pos="0 0 .26"><freejoint/><geom name="ball" type="sphere" size=".05"/></body>

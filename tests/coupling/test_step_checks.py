@@ -197,7 +197,7 @@ def test_warning_names_a_solref_where_the_time_step_suffices() -> None:
     assert shoot(10.0, solref, 0.002) == Shot(bounced=True, warnings=[])
 
 
-def test_a_pair_is_warned_of_again_only_if_it_is_much_worse() -> None:
+def test_a_warning_about_a_pair_is_repeated_only_if_it_gets_much_worse() -> None:
     ball = '<body name="{}" pos="{} 0 {}"><freejoint/><geom size="0.03"/></body>'
     balls = [("first", 0.0, 0.2, 10), ("as bad", 0.1, 0.9, 15), ("worse", 0.2, 2.0, 40)]
     xml = f"<worldbody>{PLATE}{''.join(ball.format(*each[:3]) for each in balls)}</worldbody>"

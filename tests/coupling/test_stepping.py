@@ -27,7 +27,7 @@ class Watch:
         return self.clock.look(self.model, self.data)
 
 
-def test_first_look_counts_as_one_step_but_not_before_any() -> None:
+def test_the_first_call_counts_as_one_step_unless_time_is_0() -> None:
     assert Watch().at(3.7) == Passed(DT)
     watch = Watch()
     assert watch.at(0.0) == Passed(0.0)
@@ -149,7 +149,7 @@ def test_several_clocks_see_the_same_resets() -> None:
         assert [goes_on(clock, model, data) for clock in order] == [True, True]
 
 
-def test_no_mark_is_made_where_mujoco_writes_itself() -> None:
+def test_solver_fwdinv_stays_mujocos_if_mujoco_uses_it() -> None:
     model, data, clock = made(fwdinv="enable")
     mujoco.mj_step(model, data, 20)
     assert goes_on(clock, model, data)

@@ -33,7 +33,7 @@ RAIN = """<mujoco><worldbody><geom name="target" size="0.5"/>{}</worldbody></muj
 FALLING = '<body pos="0 0 1.6"><freejoint/><geom size="{}" mass="{}"/></body>'
 
 
-def test_the_preset_suited_takes_its_size_and_a_typical_hit_from_the_model(tmp_path: Path) -> None:
+def test_the_suited_preset_takes_size_and_typical_hit_from_the_model(tmp_path: Path) -> None:
     bodies = "".join(
         FALLING.format(radius, mass) for radius, mass in ((0.05, 0.2), (0.08, 0.5), (0.2, 9.0))
     )
@@ -85,7 +85,7 @@ def highest(
     return top, run.ripples
 
 
-def test_a_heavy_box_rests_in_a_shallow_pit_and_density_makes_up_for_a_given_stiffness() -> None:
+def test_a_heavy_box_rests_in_a_shallow_pit_with_any_stiffness() -> None:
     model = mujoco.MjModel.from_xml_string(BOX.format(mass=20))
     top, ripples = highest(model, Material(), 1.5, resolution=24)
     assert 1e-5 < top < 0.01
@@ -263,7 +263,7 @@ def test_a_density_ends_the_easing() -> None:
 @pytest.mark.parametrize(
     ("is_eased", "texels", "is_told"), [(False, 1, True), (True, 1, False), (True, 500, True)]
 )
-def test_where_forces_are_eased_a_height_on_less_than_a_hundredth_of_the_surface_is_no_fault(
+def test_eased_targets_are_not_reported_for_high_waves_on_a_hundredth_of_the_surface(
     is_eased: bool, texels: int, is_told: bool
 ) -> None:
     """A ring that runs into a thin rim is limited in pictures, and a density would hide it."""
@@ -502,7 +502,7 @@ def test_a_crest_of_any_step_is_reported(before: int, after: int, end: str) -> N
 
 
 @pytest.mark.parametrize(("density", "is_too_high"), [(8.0, False), (3.0, True)])
-def test_waves_are_judged_by_the_ring_and_not_by_the_dent_under_the_body(
+def test_only_the_height_of_the_ring_is_judged_and_not_the_dent_under_the_body(
     density: float, is_too_high: bool
 ) -> None:
     """Both dents are deeper than a quarter of the radius, 0.125 m; one ring is higher than that."""
@@ -530,7 +530,7 @@ def test_steep_waves_are_reported_although_they_are_low() -> None:
         ripples.mj_step(data, nstep=80)
 
 
-def test_a_target_may_have_any_height_if_that_is_wanted() -> None:
+def test_allow_any_height_turns_the_warning_off() -> None:
     data, ripples = still_ripples()
     ripples.allow_any_height("target")
     ripples["target"].height = 0.4

@@ -164,7 +164,7 @@ def test_users_forces_stay_as_they_were() -> None:
         np.testing.assert_array_equal(data.xfrc_applied[1], FORCE)
 
 
-def test_nothing_is_left_after_a_reset() -> None:
+def test_a_reset_leaves_only_the_users_forces() -> None:
     data, ripples = pushed(lambda data: None)
     ripples.reset()
     np.testing.assert_array_equal(data.xfrc_applied, [[0.0] * 6, FORCE])
@@ -193,7 +193,7 @@ def test_a_ripple_reaches_a_ball_above_it_only_up_to_its_height() -> None:
     np.testing.assert_array_equal(missed, missed[0])
 
 
-def test_a_surface_that_has_moved_gives_way_as_one_that_was_there_from_the_start() -> None:
+def test_a_moved_surface_gives_way_like_a_surface_built_there() -> None:
     """Twice as long and wide it has a quarter of the texels under a ball: it gives way more."""
     heights = []
     for steps_before in (3, 0):

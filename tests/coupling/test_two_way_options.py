@@ -89,7 +89,7 @@ def places_without_sleep() -> np.ndarray:
 
 
 @pytest.mark.parametrize("sleep", ["", 'sleep="init"'])
-def test_a_stack_sleeps_in_its_dimple_and_presses_on(
+def test_a_sleeping_stack_keeps_its_dimple_and_its_pressure(
     sleep: str, places_without_sleep: np.ndarray
 ) -> None:
     run = stack("enable", sleep)

@@ -143,7 +143,9 @@ def test_a_blender_that_fails_leaves_no_video(
     ],
     ids=["overlay", "transparent", "compare"],
 )
-def test_options_of_ours_alone_are_refused(given: dict, said: str, tmp_path: Path) -> None:
+def test_options_that_cycles_does_not_have_are_refused(
+    given: dict, said: str, tmp_path: Path
+) -> None:
     with pytest.raises(RippleError, match=said):
         check_cycles(VideoOptions(**given), tmp_path / "a.webp")
 

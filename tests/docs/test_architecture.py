@@ -24,7 +24,7 @@ def plots() -> Iterator[SimpleNamespace]:
         del sys.modules[name]
 
 
-def test_walk_on_the_page_is_that_of_the_source(plots) -> None:
+def test_the_walk_on_the_page_matches_the_source(plots) -> None:
     page = PAGE.read_text(encoding="utf-8")
     walk = re.findall(r"^\d+\. `([\w/]+\.py)`", page, re.MULTILINE)
     assert walk == plots.structure.walk(), (
@@ -84,7 +84,7 @@ LOAD = "ripple_sim.coupling.load"
 SIMULATION = "ripple_sim.simulation"
 
 
-def test_imports_are_those_of_the_modules_that_names_come_from_and_cycles_are_found(
+def test_imports_are_traced_to_the_defining_modules_and_cycles_are_found(
     plots, tmp_path: Path
 ) -> None:
     for name, text in TREE.items():
@@ -106,6 +106,6 @@ def test_imports_are_those_of_the_modules_that_names_come_from_and_cycles_are_fo
     assert plots.imports.cycles(rooms) == []
 
 
-def test_arrows_that_others_imply_are_left_out(plots) -> None:
+def test_implied_arrows_are_left_out(plots) -> None:
     arrows = {"a": {"b", "c", "d"}, "b": {"c"}, "c": {"d"}, "d": set()}
     assert plots.layered.without_detours(arrows) == {"a": {"b"}, "b": {"c"}, "c": {"d"}, "d": set()}

@@ -60,7 +60,7 @@ def render(bodies: str = BODIES, asset: str = "", **options) -> np.ndarray:
 
 @pytest.mark.usefixtures("exr")
 @pytest.mark.parametrize("channels", [3, 4])
-def test_values_come_back_bit_for_bit_under_a_header_that_names_their_colours(
+def test_exr_values_are_lossless_and_the_header_names_their_colours(
     tmp_path: Path, channels: int
 ) -> None:
     import OpenEXR
@@ -83,14 +83,14 @@ def test_values_come_back_bit_for_bit_under_a_header_that_names_their_colours(
     assert not {"capDate", "owner", "comments"} & set(header)
 
 
-def test_bytes_for_the_screen_are_no_linear_light(exr: None, tmp_path: Path) -> None:
+def test_eight_bit_frames_are_refused_as_linear_light(exr: None, tmp_path: Path) -> None:
     refused = pytest.raises(VideoError, match=r"frame must be float16 \[48, 64, 3\], got uint8")
     size = {"width": WIDTH, "height": HEIGHT, "fps": 24}
     with refused, open_writer(tmp_path / "frames", **size, frame_format="exr") as writer:
         writer.write(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
 
 
-def test_a_disk_that_fills_up_with_the_last_bytes_is_noticed(exr: None, tmp_path: Path) -> None:
+def test_a_disk_that_fills_up_at_the_end_of_a_file_is_an_error(exr: None, tmp_path: Path) -> None:
     """Half a frame of noise cannot be packed into less than it is: the file's end is cut off."""
     said = written_until_full(
         tmp_path / "frames", 60 * 60 * 3 * 2 - 1000, 60, 60, 1, frame_format="exr"
@@ -109,7 +109,7 @@ def test_without_openexr_the_extra_is_named(tmp_path: Path, capsys, monkeypatch)
     assert "missing" in capsys.readouterr().err
 
 
-def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(
+def test_linear_light_with_overlays_or_comparisons_is_refused(
     exr: None, scene: Scene, tmp_path: Path, capsys
 ):
     frames = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]

@@ -129,7 +129,7 @@ def test_frames_too_large_for_h264_are_refused_for_mp4_only(
     "name",
     ["a:b.mp4", "pipe:1.mp4", "concat:x.mp4", "file:z.gif", "%d.webm", "http:x.webp", "-.mp4"],
 )
-def test_no_name_is_taken_for_a_protocol(
+def test_file_names_that_look_like_urls_are_written_as_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.chdir(tmp_path)

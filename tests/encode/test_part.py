@@ -124,7 +124,7 @@ def test_without_resume_a_video_starts_anew(interrupted):
     assert list(interrupted.parent.iterdir()) == [interrupted]
 
 
-def test_leftovers_of_a_finished_video_are_begun_anew(interrupted):
+def test_a_video_with_an_incomplete_part_folder_is_rendered_from_the_start(interrupted):
     """The frames of a folder are in their place by then, or those of a file removed first."""
     shutil.rmtree(interrupted.with_name("clip.mp4.part") / "frames")
     assert write(interrupted, 0, FRAMES).frames == FRAMES
@@ -142,7 +142,7 @@ def test_resuming_with_other_settings_is_refused_and_harms_nothing(interrupted):
     assert contents(interrupted.parent) == before
 
 
-def test_a_simulation_that_comes_out_otherwise_is_refused_and_harms_nothing(tmp_path):
+def test_resuming_a_different_simulation_is_refused_and_keeps_the_files(tmp_path):
     path = tmp_path / "clip.mp4"
 
     def go(digest: str) -> None:

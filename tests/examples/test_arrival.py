@@ -59,7 +59,7 @@ def test_waves_arrive_in_time_on_known_meshes(name: str) -> None:
     assert np.mean([error.front_under_3_percent for error in errors]) > 0.88
 
 
-def test_same_object_otherwise_presented_has_the_same_times() -> None:
+def test_arrival_times_do_not_depend_on_rotation_scale_or_numbering() -> None:
     V, F = limbed()
     mesh = Mesh.from_arrays(V, F)
     atlas = build_atlas(mesh, 64, cache=False)
@@ -139,7 +139,7 @@ def test_table_has_our_operator_and_its_rivals() -> None:
     assert rows["fem"]["front_median"] < min(calibrated["front_median"], conformal["front_median"])
 
 
-def test_a_mesh_with_a_handle_has_no_sphere_map_and_all_else(tmp_path: Path) -> None:
+def test_the_table_of_a_mesh_with_a_handle_lacks_only_the_sphere_map(tmp_path: Path) -> None:
     ring = torus(16)
     trimesh.Trimesh(ring.V, ring.F, process=False).export(tmp_path / "ring.obj")
     rows = fronts.arrivals({"ring": load_mesh(tmp_path / "ring.obj")}, resolution=24, sources=1)[

@@ -79,7 +79,9 @@ def imported(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], M
 
 
 @pytest.mark.parametrize("file", FILES)
-def test_an_import_does_nothing_else(file: str, folder: Path, imported, capsys) -> None:
+def test_importing_an_example_has_no_side_effects(
+    file: str, folder: Path, imported, capsys
+) -> None:
     gl = os.environ.get("MUJOCO_GL")
     imported(file)
     assert capsys.readouterr() == ("", "")
@@ -88,7 +90,7 @@ def test_an_import_does_nothing_else(file: str, folder: Path, imported, capsys) 
 
 
 @pytest.mark.parametrize("file", SMALL)
-def test_an_example_in_small(file: str, imported, capsys) -> None:
+def test_a_small_version_of_an_example_runs(file: str, imported, capsys) -> None:
     constants, arguments, says = SMALL[file]
     imported(file, **constants).main(**arguments)
     assert says in capsys.readouterr().out

@@ -91,7 +91,7 @@ def test_heights_in_a_glb_have_linear_colours_and_no_metal(
     assert np.abs(egg.vertex_attributes["color"][:, :3].astype(int) - half).max() <= 3
 
 
-def test_a_folder_has_a_mesh_for_each_frame_and_is_replaced_alone(
+def test_a_folder_has_one_mesh_per_frame_and_only_our_meshes_are_replaced(
     scene: Scene, tmp_path: Path
 ) -> None:
     folder = tmp_path / "egg.meshes"
@@ -119,7 +119,7 @@ def test_a_folder_has_a_mesh_for_each_frame_and_is_replaced_alone(
         ("egg.usdc", {"height_colors": 0.1}, "height_colors is only for .ply, .glb, .meshes, not"),
     ],
 )
-def test_options_of_meshes_are_refused_elsewhere(
+def test_options_of_meshes_are_refused_for_other_formats(
     scene: Scene, tmp_path: Path, name: str, options: dict, message: str
 ) -> None:
     if name.endswith("usdc"):

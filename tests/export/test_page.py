@@ -171,9 +171,7 @@ def test_the_browser_shows_the_picture_of_our_renderer(shown: Any, ours: tuple) 
     assert (changed & ~egg).sum() < 0.05 * egg.sum()
 
 
-def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(
-    browser, soft_model, tmp_path
-):
+def test_studio_floor_shadow_and_sky_match_our_renderer(browser, soft_model, tmp_path):
     data = forwarded(soft_model)
     waves = Material(speed=0.3, density=1500.0)
     looks = {"egg": "rubber", "jelly": "jelly"}

@@ -160,7 +160,7 @@ def test_a_camera_after_kinematics_alone_gets_its_pose_with_a_warning(egg):
 
 
 @pytest.mark.filterwarnings("error")
-def test_data_without_poses_is_drawn_as_forwarded(egg):
+def test_data_without_poses_is_drawn_as_if_forwarded(egg):
     """As it comes from `MjData(model)`; it stays as it is."""
     model, data, _, renderer = egg
     new = mujoco.MjData(model)
@@ -168,7 +168,7 @@ def test_data_without_poses_is_drawn_as_forwarded(egg):
     assert not new.xquat.any()
 
 
-def test_data_of_a_model_of_other_sizes_is_drawn_with_the_sizes_of_the_renderer(egg):
+def test_data_of_a_changed_model_is_drawn_with_the_sizes_of_the_renderers_model(egg):
     model, data, _, renderer = egg
     larger = copy.copy(model)
     larger.geom_size[:] *= 1.5
@@ -196,7 +196,7 @@ def test_a_model_in_which_another_geom_would_ripple_is_refused(egg):
             RippleRenderer(other, ripples, width=96, height=72)
 
 
-def test_a_copy_of_the_model_is_drawn_in_its_own_colour_or_else_grey_or_as_a_named_look(egg):
+def test_a_copied_model_is_drawn_in_its_own_colour_or_in_the_named_look(egg):
     model, data, ripples, _ = egg
     changed = copy.copy(model)
 
@@ -374,7 +374,7 @@ def test_a_program_written_for_mujocos_renderer_runs(egg):
         renderer.render()
 
 
-def test_before_the_first_scene_there_is_nothing_to_see(egg):
+def test_pictures_before_the_first_update_are_empty(egg):
     model, _, ripples, _ = egg
     with RippleRenderer(model, ripples, 30, 40) as renderer:
         colours = renderer.render()
@@ -484,7 +484,7 @@ LINK = """<mujoco><option timestep="0.002"/><compiler inertiafromgeom="true"/>
   <keyframe><key name="home" qpos="0 .4 .15 .8 1 0 0 0"/></keyframe></mujoco>"""
 
 
-def test_a_link_in_parts_ripples_under_its_collider_and_is_seen_where_the_collider_is_hidden():
+def test_a_visual_mesh_ripples_and_is_drawn_while_its_collider_is_hidden():
     model = mujoco.MjModel.from_xml_string(LINK)
     data = mujoco.MjData(model)
     hit = Material.suited(size=0.4, hit=(0.4, 2.0))

@@ -70,7 +70,7 @@ def test_colours_are_those_of_the_scene(flat):
         assert change[rgb] - change.min() > 20, entry
 
 
-def test_a_light_that_is_added_lights_and_casts_shadows_and_one_that_is_taken_away_does_not(flat):
+def test_lights_can_be_added_to_and_removed_from_the_scene(flat):
     renderer, data = flat
     renderer.update_scene(data, "c")
     before = renderer.render().astype(int)
@@ -87,7 +87,7 @@ def test_a_light_that_is_added_lights_and_casts_shadows_and_one_that_is_taken_aw
     assert dark.mean() < 0.8 * before.mean()
 
 
-def test_waves_ride_on_their_geom_to_where_the_scene_has_it():
+def test_waves_follow_a_geom_that_is_moved_in_the_scene():
     model, data = edited_scenes.state()
     ripples = Ripples(model, {"target": Material(speed=0.5)}, resolution=16)
     ripples["target"].height = np.full_like(ripples["target"].height, 0.1)

@@ -76,7 +76,7 @@ def test_stage_is_valid_in_metres_with_z_up_and_a_time_code_a_frame(run: Any) ->
     assert all(file.date_time[0] == 1980 for file in packed)
 
 
-def test_points_and_velocities_are_ours_at_every_frame_to_a_millionth(run: Any) -> None:
+def test_stored_points_and_velocities_match_the_solver_to_a_millionth(run: Any) -> None:
     stage, seen = run
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath(SURFACE))
     assert max(np.abs(points - seen[0][0]).max() for points, *_ in seen) > 1e-5  # it moves
@@ -90,7 +90,7 @@ def test_points_and_velocities_are_ours_at_every_frame_to_a_millionth(run: Any) 
     assert UsdGeom.Mesh.ValidateTopology(indices, counts, len(seen[0][0]))[0]
 
 
-def test_bodies_and_surfaces_stand_where_mujoco_has_them(run: Any) -> None:
+def test_bodies_and_surfaces_have_mujocos_poses(run: Any) -> None:
     stage, seen = run
     stone = 2
     egg = 1
@@ -205,7 +205,7 @@ SURFACES = ("egg", "jelly")
 
 
 @pytest.mark.parametrize("chunk", [None, 3])
-def test_blender_has_our_vertices_at_every_frame(
+def test_blender_reads_the_stored_vertices_at_every_frame(
     soft_model: mujoco.MjModel, tmp_path: Path, chunk: int | None
 ) -> None:
     """Also of a soft body, and of a run in chunks."""

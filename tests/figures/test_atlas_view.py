@@ -24,7 +24,7 @@ def test_stretch_is_one_on_a_sphere_and_even_on_average(animal):
     )
 
 
-def test_pictures_show_the_texel_that_lies_there():
+def test_every_pixel_of_the_cross_shows_its_texel():
     n = 8
     atlas = sphere_atlas(1.0, n)
     numbers = np.arange(6 * n * n).reshape(6, n, n)

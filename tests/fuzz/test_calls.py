@@ -99,5 +99,5 @@ def _nothing_runs():
 
 @fuzzed
 @given(st.sampled_from([*COMMANDS, "", "rendr"]), st.lists(WORDS, max_size=6))
-def test_any_words(name: str, words: list[str]) -> None:
+def test_any_arguments_of_the_program(name: str, words: list[str]) -> None:
     assert command(name, *words) in (0, 2)

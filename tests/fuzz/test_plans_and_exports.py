@@ -101,7 +101,7 @@ def test_a_plan_with_any_value_anywhere(place: tuple, value: Any) -> None:
     st.sampled_from([*KEYS, "duration", *ATTRIBUTES]) | fuzzing.TEXTS,
     DRAWN,
 )
-def test_a_plan_that_draws_anything(part: str, key: str, drawn: Any) -> None:
+def test_a_plan_with_any_random_distribution(part: str, key: str, drawn: Any) -> None:
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
         write_files(home)
         patch.setattr(plans, "read_toml", lambda *_: TABLE | {part: {key: drawn}})

@@ -102,7 +102,7 @@ def test_an_overlay_is_drawn_in_its_own_corner(word: str, channels: int) -> None
     assert columns.max() < SIZE[0] / 2 if "left" in corner else columns.min() > SIZE[0] / 2
 
 
-def test_all_together_are_those_in_other_corners_alone() -> None:
+def test_all_overlays_together_look_like_each_alone() -> None:
     everything = painted(["contacts", "height", "energy", "time"], notes())
     for word in ("contacts", "height", "energy", "time"):
         alone = painted([word], notes())
@@ -115,7 +115,7 @@ def test_all_together_are_those_in_other_corners_alone() -> None:
     [([], {}, notes()), (["grid"], {"spacing": 0}, notes()), (["contacts"], {}, notes(marks=0.0))],
     ids=["no request", "grids that differ", "no contact yet"],
 )
-def test_nothing_is_drawn_where_there_is_nothing_to_tell(
+def test_overlays_without_data_are_not_drawn(
     words: list[str], options: dict, content: Notes
 ) -> None:
     assert (painted(words, content, **options) == 90).all()
@@ -154,7 +154,7 @@ def test_energy_plot_draws_values_at_their_height_and_grows_with_time() -> None:
     assert half - quarter == pytest.approx((whole - quarter) / 3, abs=1.5)
 
 
-def test_the_ledger_is_written_of_one_run_and_not_of_two() -> None:
+def test_the_energy_ledger_is_drawn_for_one_run_only() -> None:
     plain = notes()
     content = dataclasses.replace(notes(), ledgers=[Energy(2.0, 1.0)])
     other = dataclasses.replace(content, ledgers=[Energy(2.0, 3.0)])

@@ -36,9 +36,7 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, 
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_the_ledger_stands_beside_nothing_else_or_is_left_out(
-    size: tuple[int, int], written: list
-) -> None:
+def test_the_ledger_overlaps_nothing_or_is_left_out(size: tuple[int, int], written: list) -> None:
     layout = Layout(*size)
     bare, plot = (overlay.EnergyPlot(layout, 4.0, ledger=each) for each in (False, True))
     curve = np.linspace(0, 3, 50), np.ones(50)
@@ -178,9 +176,7 @@ def test_hidden_parts_are_faint_and_fading_marks_fainter() -> None:
 
 @pytest.mark.parametrize("channels", [3, 4])
 @pytest.mark.parametrize("shift", [(0, 0), (-30, 20), (1000, 0), (0, -1000)])
-def test_a_mark_over_the_border_is_the_one_on_a_larger_frame_cut(
-    shift: tuple[int, int], channels: int
-) -> None:
+def test_a_mark_over_the_border_is_cut_off(shift: tuple[int, int], channels: int) -> None:
     layout = Layout(1280, 720)
     opacity = np.ones(9)
     tip = np.array([40.3, 30.6])
@@ -222,7 +218,7 @@ def test_a_mark_stands_on_the_risen_surface_in_the_world() -> None:
     assert (found.impulse, found.opacity) == (2.0, 1.0)
 
 
-def test_contacts_in_one_place_add_up_and_others_are_apart_the_weakest_first() -> None:
+def test_contacts_in_one_place_add_up_and_marks_are_sorted_by_impulse() -> None:
     still = Still()
     still.impulses = [
         still.touch(1.0),
@@ -241,7 +237,7 @@ SCENE = """<mujoco><worldbody><geom type="box" size=".5 .5 .5"/>
 
 
 @pytest.mark.parametrize("size", [(640, 480), (480, 640), (33, 17)])
-def test_points_on_the_ray_through_a_pixel_come_back_to_it_and_those_behind_to_none(
+def test_points_ahead_project_to_their_pixel_and_points_behind_to_none(
     size: tuple[int, int],
 ) -> None:
     pose = CAMERA.pose()

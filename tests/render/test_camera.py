@@ -119,7 +119,7 @@ def test_the_enclosing_ball_contains_every_ball() -> None:
     assert render.enclosing(balls[:1])[1] == balls[0, 3]
 
 
-def test_balls_within_reach_are_those_that_it_touches() -> None:
+def test_within_returns_the_balls_that_touch_the_given_ball() -> None:
     balls = np.concatenate([random_balls(40), [[9.0, 0.0, 0.0, np.inf]]])
     near = render.within(balls, np.zeros(3), 1.0)
     gap = np.linalg.norm(balls[:, :3], axis=1) - balls[:, 3]
@@ -301,7 +301,7 @@ def in_opengl(camera: mujoco.MjvGLCamera, aspect: float, points: np.ndarray) -> 
 
 
 @pytest.mark.parametrize("name", ["plain", "orthographic", "off centre", "two focal lengths"])
-def test_cameras_of_all_projections_show_points_and_clip_where_opengl_does_with_mujocos_frustum(
+def test_every_projection_shows_and_clips_points_as_mujocos_frustum_does(
     name,
 ):
     model = mujoco.MjModel.from_xml_string(SENSED)
@@ -354,7 +354,7 @@ def test_a_camera_whose_pose_was_never_computed_gets_it_with_a_warning():
     assert not data.cam_xmat.any()
 
 
-def test_a_camera_that_rides_along_stays_about_what_carries_it():
+def test_a_camera_on_a_body_keeps_its_distance_from_the_body():
     model = mujoco.MjModel.from_xml_string(MJCF)
     data = mujoco.MjData(model)
     distances = []
@@ -365,7 +365,7 @@ def test_a_camera_that_rides_along_stays_about_what_carries_it():
     assert distances[0] == pytest.approx(distances[1]) == pytest.approx(np.hypot(2.0, 0.2), rel=0.2)
 
 
-def test_a_camera_on_a_moving_link_is_about_its_robot_and_one_that_turns_to_a_body_about_that():
+def test_the_distance_of_a_camera_is_to_its_robot_or_to_its_target_body():
     model = mujoco.MjModel.from_xml_string("""<mujoco><statistic center="9 9 9" extent="1"/>
     <worldbody>
         <body name="base" pos="3 0 0"><geom size=".2"/><body pos="0 0 1"><joint/><geom size=".2"/>

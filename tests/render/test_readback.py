@@ -63,9 +63,7 @@ def assert_same(found: list[np.ndarray], expected: list[np.ndarray]) -> None:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_any_frame_is_as_the_first_whatever_was_in_memory_or_in_the_last(
-    gl, name: str, monkeypatch
-):
+def test_frames_do_not_depend_on_earlier_frames(gl, name: str, monkeypatch):
     renderer, data = renderer_of(gl, name)
     with renderer:
         expected = drawn(renderer, data)

@@ -186,7 +186,7 @@ def similarity(a, b):
     return float(ssim.mean())
 
 
-def test_a_frame_is_that_of_the_brute_force_reference(gl):
+def test_a_frame_matches_the_brute_force_reference(gl):
     atlas = sphere_atlas(1.0, RESOLUTION)
     height_map = HeightMap(atlas.texels)(height(atlas.positions).astype(np.float32))
     ball = shapes.ball(24)

@@ -256,7 +256,7 @@ def test_faces_of_a_cube_lie_below_one_another(resources):
     np.testing.assert_allclose(got, srgb_to_linear(faces / 255), atol=0.01)
 
 
-def test_a_texture_larger_than_the_drivers_largest_is_scaled_down_and_that_is_said(
+def test_a_texture_too_large_for_the_driver_is_scaled_down_with_a_warning(
     resources,
 ) -> None:
     with resources.gl as ctx:

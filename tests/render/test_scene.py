@@ -90,7 +90,7 @@ def test_a_height_map_of_another_shape_is_refused(gl, scene, data, shape):
         scene.update(ctx, data, {0: np.zeros(shape, np.float32)}, POSE)
 
 
-def test_no_light_in_the_mjcf_means_the_studio_and_both_can_be_asked_for(gl):
+def test_a_model_without_lights_gets_the_studio_and_lighting_can_be_chosen(gl):
     dark = "<headlight active='0'/>"
     sun = SUN.format(1.0, "true")
     np.testing.assert_array_equal(

@@ -48,7 +48,7 @@ def test_every_pair_of_bytes_comes_back_from_one_channel(gl):
 
 
 @pytest.mark.parametrize("inner", [0, 1])
-def test_every_number_of_an_object_comes_back_with_its_side(gl, inner):
+def test_every_packed_object_number_and_side_is_unpacked_unchanged(gl, inner):
     given = np.arange((BITS + 1) // 2)[:, None]
     channel = f"round({BITS}.0 * pack_object(x.x, {inner} == 1)) / {BITS}.0"
     unpacked = f"vec4(float(unpack_object({channel})), float(unpack_inner({channel})), 0.0, 0.0)"

@@ -101,7 +101,7 @@ def test_message_says_that_a_mesh_or_a_model_is_no_scene(tmp_path, name: str, ad
         load_scene(tmp_path / name)
 
 
-def test_messages_tell_missing_scenes_and_models_from_folders(tmp_path) -> None:
+def test_messages_distinguish_missing_files_from_folders(tmp_path) -> None:
     with pytest.raises(
         SceneError, match=r"there is no scene .*; shipped scenes are .*duck.*path of a TOML file"
     ):
@@ -114,7 +114,7 @@ def test_messages_tell_missing_scenes_and_models_from_folders(tmp_path) -> None:
         load_model(tmp_path)
 
 
-def test_message_gives_mujocos_reason_in_one_line_and_other_errors_pass() -> None:
+def test_mujocos_reason_is_given_in_one_line_and_other_errors_pass() -> None:
     with (
         pytest.raises(SceneError, match=r"^MuJoCo refuses 'a\.xml': first second$") as error,
         refusal_of("'a.xml'"),
@@ -146,7 +146,7 @@ def test_a_scene_names_geoms_by_their_place_and_those_that_collide_for_a_target(
     assert {(each.geom, each.other) for each in simulation.impulses} == {("shell", "ball")}
 
 
-def test_collision_geoms_that_cannot_be_are_named_when_the_scene_is_read(tmp_path: Path) -> None:
+def test_impossible_contacts_are_refused_when_the_scene_is_read(tmp_path: Path) -> None:
     path = write_scene(
         tmp_path, LINK, 'model = "scene.xml"\n[[ripple]]\ngeom = "shell"\ncontacts = ["ball"]\n'
     )
@@ -245,7 +245,7 @@ KEY = '<keyframe><key/><key name="start" {}/></keyframe>'
         ),
     ],
 )
-def test_a_model_with_a_senseless_setting_is_refused(
+def test_a_model_with_an_invalid_setting_is_refused(
     tmp_path: Path, setting: str, message: str
 ) -> None:
     with pytest.raises(SceneError, match=message):
@@ -255,7 +255,7 @@ def test_a_model_with_a_senseless_setting_is_refused(
     )
 
 
-def test_a_scene_file_that_is_a_fifo_is_named_as_what_it_is(tmp_path: Path) -> None:
+def test_a_scene_file_that_is_a_fifo_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "scene.toml")
     with pytest.raises(SceneError, match=r"scene\.toml' is not a regular file"):
         load_scene(tmp_path / "scene.toml")

@@ -171,7 +171,7 @@ def simulation(folder: Path, script: str, **options) -> Simulation:
     return Simulation(scene, fps=100, backend="cpu", **options)
 
 
-def test_a_target_keeps_its_volume_unless_its_scene_says_not(tmp_path: Path) -> None:
+def test_a_target_keeps_its_volume_unless_conserve_volume_is_false(tmp_path: Path) -> None:
     poke = '[[poke]]\ngeom = "egg"\ntime = 0\npoint = [0.3, 0, 0]\nimpulse = 0.02\n'
     for line, conserves in (
         ("", True),

@@ -112,7 +112,7 @@ def test_an_image_times_the_colours_of_corners() -> None:
             np.testing.assert_allclose(seen(image, triangle, weights), truth, atol=0.03)
 
 
-def test_image_that_do_not_fit_are_scaled_and_endless_ones_are_their_mean() -> None:
+def test_too_large_images_are_scaled_and_often_repeated_images_become_their_mean() -> None:
     large = ImageSource(
         png(np.repeat(np.uint8([[RED, BLUE]]), 1024, axis=1).repeat(2048, 0)), "large"
     )

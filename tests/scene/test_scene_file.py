@@ -339,7 +339,7 @@ def filmed(**camera: object) -> Scene:
     return Scene("still", MODEL, (RippleEntry(geom="egg"),), CameraEntry(**camera), 1.0)
 
 
-def test_through_camera_changes_the_camera_alone_and_not_the_scene_itself() -> None:
+def test_through_camera_returns_a_copy_with_another_camera() -> None:
     before = filmed(shutter=180.0)
     after = scene.through_camera(before, "side")
     assert after.camera == CameraEntry(name="side")
@@ -398,7 +398,7 @@ def test_an_exposure_without_effect_or_sense_is_refused(
         scene.with_exposure(filmed(**camera), **changes)
 
 
-def test_request_takes_every_name_and_ranges() -> None:
+def test_an_overlay_request_takes_every_name_and_a_range() -> None:
     request = scene.parse_request([" height=0.02", "contacts", "grid", "time", "energy "])
     assert request == scene.Request("height", 0.02, True, True, True, True)
     assert scene.parse_request(["velocity"]) == scene.Request(heatmap="velocity")
@@ -418,7 +418,7 @@ def test_request_takes_every_name_and_ranges() -> None:
         (["time=3"], "has no range"),
     ],
 )
-def test_request_refuses(words: list[str], said: str) -> None:
+def test_invalid_overlay_requests_are_refused(words: list[str], said: str) -> None:
     with pytest.raises(SceneError, match=said):
         scene.parse_request(words)
 

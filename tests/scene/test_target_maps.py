@@ -103,7 +103,7 @@ def test_thickness_limits_hold(folder: Path) -> None:
         ),
     ],
 )
-def test_senseless_entries_are_refused(entry: dict, message: str) -> None:
+def test_invalid_inside_entries_are_refused(entry: dict, message: str) -> None:
     with pytest.raises(RippleError, match=message):
         msgspec.convert(entry, InsideEntry).check()
 
@@ -125,7 +125,7 @@ def test_a_scene_without_a_layer_is_refused(folder: Path, toml: str, message: st
         simulation_of(folder, toml + "[[ripple.inside]]\nmesh = 'core.stl'\n")
 
 
-def test_files_are_told_apart_by_their_endings(folder: Path) -> None:
+def test_meshes_and_volumes_are_distinguished_by_their_endings(folder: Path) -> None:
     with pytest.raises(RippleError, match="is a volume, which needs a threshold"):
         load_inside(folder / "core.npy")
     with pytest.raises(RippleError, match="is a mesh, which takes no threshold"):
@@ -158,7 +158,7 @@ NAMES = {"x": X, "y": Y, "z": 0 * X}
         ("maximum(sqrt(abs(x)), log(1 + y))", np.maximum(np.sqrt(np.abs(X)), np.log(1 + Y))),
     ],
 )
-def test_values_of_expressions(text: str, value: np.ndarray) -> None:
+def test_expressions_have_the_values_of_numpy(text: str, value: np.ndarray) -> None:
     np.testing.assert_allclose(evaluate(text, NAMES), value, rtol=1e-14, atol=1e-16)
 
 
@@ -252,7 +252,7 @@ def test_an_image_is_taken_in_the_mesh_s_own_coordinates(tmp_path: Path) -> None
     ],
     ids=["none", "two", "name", "absent", "small", "endless", "no-array", "infinite"],
 )
-def test_senseless_shapes_are_refused(tmp_path: Path, height: str, message: str) -> None:
+def test_invalid_initial_shapes_are_refused(tmp_path: Path, height: str, message: str) -> None:
     np.save(tmp_path / "small.npy", np.zeros((2, 2)))
     np.save(tmp_path / "endless.npy", np.full((6, 8, 8), np.nan))
     with pytest.raises(RippleError, match=message):

@@ -39,7 +39,7 @@ def test_every_cube_target_has_a_stored_sphere_map(
     assert {sphere_map_path(mesh) for mesh in meshes} == set(FOLDER.glob("*.npy"))
 
 
-def test_they_are_certified(meshes: list[Mesh]) -> None:
+def test_stored_sphere_maps_are_certified(meshes: list[Mesh]) -> None:
     for mesh in meshes:
         assert certify(mesh.F, shipped_sphere_map(mesh)).valid
 
@@ -53,13 +53,13 @@ def test_stored_sphere_maps_equal_newly_built_maps(meshes: list[Mesh]) -> None:
     assert shipped == pytest.approx(made, rel=0.02)
 
 
-def test_a_changed_mesh_has_none(meshes: list[Mesh]) -> None:
+def test_a_changed_mesh_has_no_stored_sphere_map(meshes: list[Mesh]) -> None:
     V = meshes[0].V.copy()
     V[0] += 1e-6
     assert shipped_sphere_map(dataclasses.replace(meshes[0], V=V)) is None
 
 
-def test_a_shipped_scene_takes_it() -> None:
+def test_a_shipped_scene_uses_its_stored_sphere_map() -> None:
     scene = load_scene("animal")
     geom = find_geom(scene.model, scene.targets[0].geom)
     shipped = shipped_sphere_map(target_mesh(scene.model, geom))

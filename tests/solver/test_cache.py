@@ -50,13 +50,13 @@ def ball_mesh() -> Mesh:
     return Mesh.from_arrays(*icosphere(1))
 
 
-def test_a_limit_of_zero_keeps_nothing(monkeypatch, ball_mesh: Mesh) -> None:
+def test_a_cache_limit_of_0_keeps_no_file(monkeypatch, ball_mesh: Mesh) -> None:
     monkeypatch.setenv(cache.LIMIT, "0")
     build_atlas(ball_mesh, 8)
     assert not cache.cached_files()
 
 
-def test_the_files_of_others_stay(folder: Path, monkeypatch) -> None:
+def test_files_of_other_programs_stay_in_the_cache(folder: Path, monkeypatch) -> None:
     foreign = [folder / "notes.txt", folder / "atlas.npz", folder / f"{'a' * 32}.npz.bak"]
     for path in foreign:
         path.write_bytes(bytes(1000))

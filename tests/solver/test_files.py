@@ -136,7 +136,7 @@ def test_the_limits_of_cgroups_and_of_those_above_count(version: str, tmp_path: 
         assert least == (200_000_000, "the memory limit of the cgroup (1.00 GB)")
 
 
-def test_where_nothing_is_known_nothing_is_refused(
+def test_nothing_is_refused_if_the_free_memory_is_unknown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert list(rooms(tmp_path)) == []

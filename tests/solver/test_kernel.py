@@ -48,7 +48,7 @@ def test_division_by_zero_follows_numpy_and_raises_nothing(
     np.testing.assert_equal(quotient(a, b), expected)
 
 
-def test_numbers_written_at_calls_are_of_one_type() -> None:
+def test_literal_arguments_share_one_compiled_version() -> None:
     @kernel
     def doubled(x):
         return 2 * x

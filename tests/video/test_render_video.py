@@ -152,9 +152,7 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
     assert render_video(scene, tmp_path / "frames", options).resumed_at > 8
 
 
-def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(
-    scene, tmp_path, monkeypatch
-):
+def test_a_video_is_the_same_if_waves_on_a_gpu_run_during_drawing(scene, tmp_path, monkeypatch):
     """A software driver taken for hardware: two threads share its context, two frames wait."""
     threads: set[str] = set()
     for hardware in (False, True):
@@ -179,7 +177,7 @@ def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(
     assert np.abs(host - device).max() <= 1
 
 
-def test_a_stage_runs_ahead_in_another_thread_as_far_as_it_may_and_no_further():
+def test_a_stage_runs_ahead_in_its_thread_up_to_its_limit():
     begun: list[int] = []
     threads = set()
     taken = []
@@ -207,7 +205,7 @@ def test_a_stage_runs_ahead_in_another_thread_as_far_as_it_may_and_no_further():
     assert threading.active_count() == before
 
 
-def test_an_error_comes_where_the_next_item_would_have_come():
+def test_an_error_is_raised_in_place_of_the_next_item():
     def items() -> Iterator[int]:
         yield 1
         yield 2
@@ -349,7 +347,7 @@ def rings_alone(scene: Scene, tmp_path: Path, **changes: object) -> list[str]:
     return [str(each.message) for each in told if "higher than a pixel" in str(each.message)]
 
 
-def test_a_ring_lower_than_a_pixel_is_told_of_though_the_dent_under_the_body_is_higher(
+def test_warning_about_a_ring_lower_than_a_pixel_despite_a_visible_dent(
     scene: Scene, tmp_path: Path
 ) -> None:
     [message] = rings_alone(scene, tmp_path)

@@ -160,7 +160,7 @@ def test_every_run_has_a_secret_of_its_own() -> None:
     assert all(len(secret) == 32 for secret in secrets)
 
 
-def test_other_machines_are_let_in_by_their_users_choice_alone() -> None:
+def test_only_the_user_can_let_other_machines_in() -> None:
     assert all(access.is_local(host) for host in ("127.0.0.1", "localhost", "::1"))
     assert not any(access.is_local(host) for host in ("0.0.0.0", "192.168.0.7", "a.b"))
     assert access.address("0.0.0.0", 80, "s1").startswith(f"http://{socket.gethostname()}:80/")

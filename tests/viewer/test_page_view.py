@@ -120,7 +120,7 @@ def test_pokes_and_balls_reach_the_program_and_waves_are_the_same_in_both(page: 
     page.wait_for(page.agrees)
 
 
-def test_what_changes_the_waves_changes_them_in_the_page(page: Page) -> None:
+def test_changes_of_the_waves_reach_the_page(page: Page) -> None:
     """A reset, another operator and another material: the page gets the new law and the state."""
     session = page.view.session
     page.tab.mouse.click(150, 80)

@@ -11,7 +11,7 @@ from ripple_sim import Material, Ripples, launch_passive
 from ripple_sim.errors import DisplayError
 
 
-def test_on_a_screen(screen: str) -> None:
+def test_checks_pass_on_a_screen(screen: str) -> None:
     checks = Path(__file__).with_name("passive_checks.py")
     words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", str(checks))
     result = ended(*words, env={**os.environ, "DISPLAY": screen}, timeout=600)

@@ -29,11 +29,11 @@ def check(display: str | None, *options: str) -> None:
     assert result.returncode == 0, result.stdout + result.stderr
 
 
-def test_off_screen() -> None:
+def test_window_checks_pass_off_screen() -> None:
     check(None)
 
 
-def test_on_a_screen(screen: str) -> None:
+def test_checks_pass_on_a_screen(screen: str) -> None:
     # a kind of its events each
     check(screen, "-k", "click_pokes or drag_turns or one_quits or knob or loop")
 

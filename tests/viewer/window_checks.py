@@ -259,7 +259,7 @@ def test_a_window_that_is_dropped_is_closed_and_nothing_keeps_it(scene, tmp_path
     assert [kind for kind, each in kept.items() if each() is not None] == []
 
 
-def test_an_unwritable_folder_is_told_and_the_window_goes_on(window: Window) -> None:
+def test_an_unwritable_folder_is_reported_and_the_window_stays_open(window: Window) -> None:
     window.recorder.folder = Path("/proc/nowhere")
     press(window, "s")
     assert "cannot write /proc/nowhere/sphere-1.png" in window.message

@@ -187,7 +187,9 @@ def backgrounds(gl, monkeypatch, size, body: str, **options) -> list[np.ndarray]
 @pytest.mark.parametrize("lamp", LAMPS)
 @pytest.mark.parametrize("floor", ["0 0 .1", "1.2 .9 .1"], ids=["endless", "finite"])
 @pytest.mark.parametrize("elevation", [-3.0, -25.0])
-def test_the_interpolated_background_is_that_of_each_pixel(gl, monkeypatch, lamp, floor, elevation):
+def test_the_interpolated_background_is_close_to_the_exact_one(
+    gl, monkeypatch, lamp, floor, elevation
+):
     body = f'{LAMPS[lamp]}<geom type="plane" size="{floor}" rgba=".8 .7 .6 1"/>{SOLIDS}'
     camera = Camera((0, 0, 0.2), 3.0, 70.0, elevation)
     interpolated, exact = backgrounds(gl, monkeypatch, (203, 151), body, camera=camera)

@@ -139,7 +139,7 @@ def test_a_shadow_on_the_floor_has_the_size_that_geometry_gives_it(gl):
     assert edge == pytest.approx(0.5 + 0.01, abs=0.015)
 
 
-def test_blockers_are_means_over_all_texels_of_the_map(gl, resources, frame):
+def test_blockers_are_means_over_all_texels_of_the_shadow_map(gl, resources, frame):
     """Coverage, and its first two moments of the distance from the light, to the coarsest level."""
     sun = Light(np.array([0.0, 0.0, 1.0]), np.ones(3), None, 0.02, np.pi, shadow=True)
     maps = ShadowMaps(resources, 1, 360)
@@ -173,7 +173,7 @@ def floor_at(frame, x, y=0.0, half=2):
 
 
 @pytest.mark.parametrize("opacity", [0.2, 0.5, 0.8])
-def test_a_transparent_geom_takes_its_opacity_of_the_light(gl, opacity):
+def test_a_transparent_geom_blocks_light_in_proportion_to_its_opacity(gl, opacity):
     """A plate 1 m up throws its shadow 1 m to the right."""
     shaded, full = (
         frame_of(gl, DARK_FLOOR + PLATE.format(each) + SUN.format(1.0, "true"))
@@ -215,7 +215,7 @@ def test_water_is_a_lens(gl):
     assert middle[..., 0].mean() < 0.7 * middle[..., 2].mean()
 
 
-def test_no_light_is_taken_beside_a_penumbra(gl):
+def test_no_light_is_lost_beside_a_penumbra(gl):
     """Where a box's shadow shows, what is plainly shaded is a few pixels away."""
     box = '<geom type="box" size=".5 .5 .5" pos="-.5 .2 .5" euler="0 0 40" rgba=".9 .1 .2 .4"/>'
     body = DARK_FLOOR + box + SUN

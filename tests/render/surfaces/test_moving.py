@@ -55,7 +55,7 @@ def test_a_rigid_motion_changes_nothing(divisions):
 
 
 @pytest.mark.parametrize("divisions", [10, 24])
-def test_a_dent_gets_as_dark_as_one_that_was_there_from_the_beginning(divisions):
+def test_a_moving_dent_darkens_like_a_dent_in_the_mesh(divisions):
     ball = shapes.ball(divisions)
     moving, baked = occlusion(ball.shell, ball.faces)
     V, depth = dented(ball.shell)
@@ -111,7 +111,7 @@ def test_two_sides_of_a_thin_plate_stay_apart():
     assert moved[middle & (V[:, 2] < 0)].min() > 0.97
 
 
-def test_a_frame_shows_a_dent_darker_than_with_the_light_at_rest(monkeypatch):
+def test_the_moving_occlusion_darkens_a_dent_in_the_frame(monkeypatch):
     model, data = posed(
         """<mujoco><worldbody><light pos="0 3 0" dir="0 -1 0"/>
         <geom name="target" type="sphere" size=".2"
@@ -132,7 +132,7 @@ ATLAS = sphere_atlas(1.0, 8)
 MATRIX = TURN.as_matrix()
 
 
-def test_a_rigid_motion_takes_points_and_normals_along():
+def test_points_and_normals_follow_a_rigid_motion():
     points = ATLAS.positions.reshape(-1, 3)
     moving = MovingVertices(ATLAS.mesh.V, ATLAS.mesh.F, 1.01 * points, points, points)
     moved, directions, normals = moving(ATLAS.mesh.V @ MATRIX.T + [1, 2, 3])

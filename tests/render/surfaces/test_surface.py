@@ -28,7 +28,7 @@ from ripple_sim.solver.layouts.cube import CHART_NORMALS
         ('material="checked"', (0.9, 0.8, 0.7), (0.9, 0.8, 0.7)),
     ],
 )
-def test_a_colour_is_the_given_one_or_the_models_or_the_looks(geom, given, shown):
+def test_a_target_has_the_chosen_colour_or_the_models_or_the_looks(geom, given, shown):
     """A video once took the look's colour where a loop of one's own took the geom's."""
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><asset><material name="green" rgba="0 .8 0 1"/>'
@@ -105,7 +105,7 @@ def test_no_gap_opens_and_no_area_is_lost(pair):
     np.testing.assert_array_equal(directed, np.unique(sides[:, ::-1], axis=0))
 
 
-def test_every_triangle_lies_in_one_chart_on_its_side_with_unit_normals(pair):
+def test_every_cut_triangle_lies_in_one_chart_with_unit_normals(pair):
     _, _, cut = pair
     chart = cut.chart[cut.F]
     corners = cut.attributes[cut.F]
@@ -121,7 +121,7 @@ def test_every_triangle_lies_in_one_chart_on_its_side_with_unit_normals(pair):
     assert (np.einsum("fi,fki->fk", cross, corners[:, :, 3:6]) > 0).all()
 
 
-def test_vertices_are_the_same_on_both_sides_of_a_border_and_nowhere_else(pair):
+def test_only_vertices_on_chart_borders_are_shared(pair):
     """Equal where position and normal are: a border is no crease, and a crease stays one."""
     _, _, cut = pair
     _, by_value = np.unique(cut.attributes[:, :6].round(9), axis=0, return_inverse=True)
@@ -134,7 +134,7 @@ def test_vertices_are_the_same_on_both_sides_of_a_border_and_nowhere_else(pair):
     assert np.unique(cut.same, return_counts=True)[1].max() == 3  # at the cube's corners
 
 
-def test_texture_coordinates_keep_their_jump_where_a_seam_crosses_a_border():
+def test_texture_coordinates_keep_their_seam_across_a_border():
     """Two triangles share a side over an edge of the cube, at which a texture ends and begins."""
     V = np.array(
         [[1.0, 0.1, 0.5], [1.0, 0.1, -0.5], [0.5, -0.6, 1.0], [0.5, 0.8, 1.0], [0.5, 0.1, 1.0]]

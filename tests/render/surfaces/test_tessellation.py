@@ -206,7 +206,9 @@ def scene(gl):
 
 
 @pytest.mark.parametrize("group", [32, 256])
-def test_the_triangles_are_the_hosts_in_their_order(gl, scene, group, monkeypatch) -> None:
+def test_tessellation_on_the_gpu_gives_the_triangles_of_the_cpu_in_order(
+    gl, scene, group, monkeypatch
+) -> None:
     monkeypatch.setattr(adaptive, "_GROUP", group)  # of 32 there are more than a group has threads
     renderer, atlas, frame = scene
     (target,) = renderer._scene.targets

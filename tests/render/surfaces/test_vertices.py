@@ -76,7 +76,7 @@ def test_a_wave_over_the_edges_of_a_box_is_a_smooth_curve():
     assert departure.max() < 0.02
 
 
-def test_a_surface_counts_v_from_below_and_a_model_from_above(vertices):
+def test_v_of_surfaces_and_of_models_have_opposite_directions(vertices):
     attributes = vertices.attributes[:4].copy()
     attributes[:, surfaces.UV] = [[0, 0], [1, 0], [0.25, 1], [0.5, 0.75]]
     own = surfaces.mapped_coordinates(attributes, TextureMapping(own=True))
@@ -95,7 +95,7 @@ def parts_of(shape: trimesh.Trimesh):
     return rounded
 
 
-def test_a_cut_ball_stays_round_and_corners_that_meet_have_the_same_normal_to_the_last_bit():
+def test_a_cut_ball_stays_round_and_shared_corners_have_identical_normals():
     """Flat triangles of this ball lie up to 2 % under it, quadratic patches a tenth of that."""
     parts, V, normals = parts_of(trimesh.creation.icosphere(subdivisions=2))
     assert np.linalg.norm(parts.V, axis=1).min() < 0.983

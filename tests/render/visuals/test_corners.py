@@ -81,7 +81,7 @@ def test_a_wall_close_above_hides_the_sky_and_one_further_than_the_radius_does_n
     assert far.min() > 0.99
 
 
-def test_the_inner_side_of_an_open_surface_sees_what_the_outer_side_of_the_turned_one_sees():
+def test_both_sides_of_an_open_surface_see_their_own_surroundings():
     ball = shapes.ball(8)
     bowl = ball.faces[(ball.shell[ball.faces][:, :, 2] < 0.1).all(axis=1)]
     one = bake(ball.shell, bowl, ball.shell)

@@ -48,7 +48,7 @@ def test_sites_of_visible_groups_are_drawn_like_geoms(gl):
     assert (green[ball][:, 1] > green[ball][:, 0] + 60).mean() > 0.9
 
 
-def test_a_material_answers_light_as_it_says():
+def test_the_look_of_a_material_follows_its_shininess_roughness_and_reflectance():
     """Roughness is taken where it is given; otherwise more shininess is less of it.
 
     Reflectance is a coat.
@@ -125,7 +125,7 @@ def test_capsules_fade_out_before_they_leave_the_list(resources):
     np.testing.assert_allclose(bound(resources, model, data, [0, 0, 0])[:, 0, 3], 0.2, atol=1e-6)
 
 
-def test_an_object_has_the_bits_of_all_that_darken_it_by_a_hundredth_but_not_its_own(gl, resources):
+def test_the_bits_of_an_object_name_all_occluders_of_a_hundredth_except_itself(gl, resources):
     """Whatever is left out hides less than a hundredth of the sky from any point of the object."""
     rng = np.random.default_rng(7)
     places = rng.uniform(-2, 2, (MAX_OCCLUDERS, 3))

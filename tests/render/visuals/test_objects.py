@@ -71,7 +71,7 @@ def test_poses_are_those_of_the_data(visuals):
     np.testing.assert_allclose(site._records["origin"], data.site_xpos, atol=1e-6)
 
 
-def test_nearer_and_larger_frames_need_more_segments_and_then_edges_are_within_a_quarter_of_a_pixel(
+def test_round_edges_are_exact_to_a_quarter_of_a_pixel_at_any_distance_and_size(
     visuals,
 ):
     drawn, data, update = visuals
@@ -90,7 +90,7 @@ def test_nearer_and_larger_frames_need_more_segments_and_then_edges_are_within_a
     assert both._segments >= segments[-1]
 
 
-def test_where_shapes_are_measured_each_round_one_has_the_segments_that_it_needs_itself(resources):
+def test_each_round_shape_gets_its_own_number_of_segments_if_shapes_are_sharp(resources):
     balls = "".join(f'<geom size=".1" pos="{x} 0 0"/>' for x in (0.0, 1.0, 8.0, 60.0))
     model, data = posed(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
     (drawn,) = instances_of(Assets(model, resources), visuals_of(model, range(model.ngeom)))

@@ -85,7 +85,7 @@ def test_a_primitive_is_closed_and_has_its_sizes_its_volume_and_its_area(
     )
 
 
-def test_a_plane_is_as_large_as_it_says_or_far_larger_than_the_model():
+def test_a_plane_has_its_size_and_an_endless_plane_is_far_larger_than_the_model():
     for size, reach in (("2 3", [2, 3, 0]), ("0 3", [np.inf, 3, 0])):
         model, shape, core, shell = drawn(f'type="plane" size="{size} .1"')
         V = np.abs(shape.positions(core, shell)).max(axis=0)
@@ -94,7 +94,7 @@ def test_a_plane_is_as_large_as_it_says_or_far_larger_than_the_model():
         )
 
 
-def test_height_field_stands_as_high_as_it_says():
+def test_a_height_field_has_the_heights_and_the_base_of_the_model():
     model = mujoco.MjModel.from_xml_string("""<mujoco>
       <asset><hfield name="h" nrow="3" ncol="4" size="2 1 .5 .1"/></asset>
       <worldbody><geom type="hfield" hfield="h"/></worldbody></mujoco>""")

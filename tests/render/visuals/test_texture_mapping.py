@@ -46,7 +46,7 @@ def corners(distance: int) -> list[tuple[int, int]]:
 @pytest.mark.parametrize(
     ("shape", "look"), [("sphere", "model"), ("capsule", "model"), ("sphere", "rubber")]
 )
-def test_a_target_has_its_texture_as_other_geoms_do(gl, shape, look):
+def test_the_texture_of_a_target_lies_where_it_lies_on_other_geoms(gl, shape, look):
     model = textured_model(f'<geom type="{shape}" size=".4 .2" material="m"/>')
     ball = shapes.ball(12)
     V = 0.4 * ball.shell + (np.sign(ball.shell) * [0, 0, 0.2] if shape == "capsule" else 0.0)

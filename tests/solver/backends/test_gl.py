@@ -86,7 +86,7 @@ SURFACES = {"sphere": lambda: SPHERE, "strips": lambda: texel_atlas(square(70)),
 
 @pytest.mark.parametrize(("rim", "tightening"), [("free", 0.0), ("fixed", 1.5)])
 @pytest.mark.parametrize("name", SURFACES)
-def test_weights_links_and_time_step_are_those_of_the_cpu(
+def test_weights_links_and_time_step_on_the_gpu_equal_those_on_the_cpu(
     opengl, monkeypatch, name: str, rim: str, tightening: float
 ):
     monkeypatch.setattr(GLContext, "software", False)

@@ -176,9 +176,7 @@ def test_a_device_that_does_not_exist_is_named_in_the_error(opengl: None, device
         create_context(device)
 
 
-def test_the_device_that_the_user_has_chosen_for_mujoco_is_ours_too(
-    opengl: None, monkeypatch
-) -> None:
+def test_the_device_chosen_for_mujoco_is_used(opengl: None, monkeypatch) -> None:
     made = []
     create = moderngl.create_context
     monkeypatch.setattr(
@@ -290,7 +288,7 @@ def test_the_error_without_a_context_names_the_features_that_work(
         create_context(None)
 
 
-def test_the_context_that_is_entered_is_the_current_one(opengl: None) -> None:
+def test_the_entered_context_is_current_in_its_thread_alone(opengl: None) -> None:
     context = shared_context()
     with context:
         inside = current_context()

@@ -55,7 +55,7 @@ def test_an_error_in_our_block_leaves_the_program_its_context(gl_backend: str) -
         assert EGLCurrent.of_thread() == own
 
 
-def test_a_thread_creates_the_kind_of_contexts_that_it_did_before(opengl: None) -> None:
+def test_our_context_leaves_the_threads_egl_api_unchanged(opengl: None) -> None:
     egl = load_egl()
     embedded = 0x30A0
     before = egl.eglQueryAPI()
@@ -67,7 +67,7 @@ def test_a_thread_creates_the_kind_of_contexts_that_it_did_before(opengl: None) 
         egl.eglBindAPI(before)
 
 
-def test_where_the_program_destroys_its_context_meanwhile_none_is_current_afterwards(
+def test_no_context_is_current_if_the_program_destroyed_its_own(
     opengl: None,
 ) -> None:
     with own_context() as own:

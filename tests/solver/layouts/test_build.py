@@ -82,7 +82,9 @@ def test_a_sphere_map_of_something_else_is_refused(change, ball_mesh: Mesh) -> N
 
 
 @pytest.mark.parametrize("layout", ["cube", "patches"])
-def test_save_and_load(animal: Atlas, tmp_path: Path, layout: str) -> None:
+def test_an_atlas_is_unchanged_after_saving_and_loading(
+    animal: Atlas, tmp_path: Path, layout: str
+) -> None:
     if layout == "patches":
         animal = build_atlas(disk(8), 16, cache=False)
     animal.save(tmp_path / "deep" / "animal.npz")
@@ -155,7 +157,7 @@ def sound_atlas(V: np.ndarray, F: np.ndarray, starved: float = 0.0) -> Atlas:
 
 @EXAMPLES
 @given(seed=SEEDS, spikes=st.integers(1, 30), longest=st.floats(1, 300))
-def test_stars_with_spikes(seed: int, spikes: int, longest: float) -> None:
+def test_stars_with_spikes_get_a_sound_atlas(seed: int, spikes: int, longest: float) -> None:
     V, F = icosphere(3)
     rng = np.random.default_rng(seed)
     V[rng.choice(len(V), spikes, replace=False)] *= longest ** rng.random((spikes, 1))
@@ -164,7 +166,7 @@ def test_stars_with_spikes(seed: int, spikes: int, longest: float) -> None:
 
 @EXAMPLES
 @given(seed=SEEDS, blobs=st.integers(2, 7), neck=st.floats(0.02, 0.5), around=st.integers(5, 20))
-def test_chains_of_blobs(seed: int, blobs: int, neck: float, around: int) -> None:
+def test_chains_of_blobs_get_a_sound_atlas(seed: int, blobs: int, neck: float, around: int) -> None:
     rng = np.random.default_rng(seed)
     place = np.linspace(0, blobs, 16 * blobs + 1)
     size = np.interp(place, np.arange(blobs + 1), rng.uniform(0.4, 1, blobs + 1))
@@ -181,7 +183,7 @@ def test_a_hard_shape_gives_the_same_bits_again() -> None:
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
-def test_charts_that_take_long_are_logged(
+def test_long_computations_of_charts_are_logged(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     build = sys.modules[build_atlas.__module__]

@@ -55,7 +55,7 @@ def test_a_triangle_without_area_is_not_long() -> None:
     assert elongation(line[..., [1, 0, 2]], 0 * square)[0] == 1
 
 
-def test_texels_of_the_sphere_are_the_equiangular_cubes() -> None:
+def test_texels_of_a_sphere_are_as_long_as_those_of_an_equiangular_cube() -> None:
     # at the corners of the cube lines cross at 120 degrees, which makes a circle an ellipse of 1.73
     V, F = icosphere(4)
     assert 1.5 < texel_length(Mesh.from_arrays(V, F), V) < np.sqrt(3)

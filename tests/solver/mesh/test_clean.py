@@ -89,9 +89,7 @@ def test_every_hole_of_a_ball_is_a_rim_that_runs_round_it(holes: int) -> None:
 
 @pytest.mark.parametrize("half_twists", range(4))
 @pytest.mark.parametrize("loose", [False, True])
-def test_bands_keep_two_rims_and_moebius_bands_are_cut_across(
-    half_twists: int, loose: bool
-) -> None:
+def test_bands_keep_two_rims_and_moebius_bands_are_cut(half_twists: int, loose: bool) -> None:
     V, F = band(half_twists)
     mesh = made(*shuffled(V, F, half_twists, turned=0.3, loose=loose))
     cut = [note for note in mesh.notes if "one-sided" in note]

@@ -179,7 +179,9 @@ def test_materials_and_colours_belong_to_triangles(tmp_path: Path) -> None:
     np.testing.assert_allclose(looks.colors[2:], [[[32768 / 65535] * 3 + [1]] * 3] * 2)
 
 
-def test_specular_glossiness_wrap_alpha_and_what_is_not_shown(tmp_path: Path) -> None:
+def test_materials_have_specular_glossiness_wrap_modes_alpha_and_notes_of_losses(
+    tmp_path: Path,
+) -> None:
     file = Gltf()
     texture = file.texture([RED], wrapS=33071, wrapT=33648)
     gloss = {"diffuseTexture": {"index": texture}, "diffuseFactor": [1, 1, 1, 0.5]}

@@ -49,7 +49,7 @@ def test_each_face_has_the_material_before_it(tmp_path: Path) -> None:
         ("map_Kd maps\\Tex.png", "maps/tex.PNG"),
     ],
 )
-def test_image_are_found_under_the_names_that_programs_write(
+def test_images_are_found_under_the_names_that_programs_write(
     tmp_path: Path, statement: str, file: str
 ) -> None:
     (tmp_path / "maps").mkdir()
@@ -105,7 +105,7 @@ def test_lost_properties_of_materials_are_named(tmp_path: Path, mtl, head, said)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le"])
-def test_text_of_windows_is_read(tmp_path: Path, encoding: str) -> None:
+def test_files_in_windows_encodings_are_read(tmp_path: Path, encoding: str) -> None:
     (tmp_path / "a.obj").write_bytes((SQUARE + FACES).encode(encoding))
     assert len(load_mesh(tmp_path / "a.obj").F) == 2
 
@@ -180,7 +180,7 @@ def normals(mesh: Mesh) -> np.ndarray:
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
-def test_image_that_meshlab_names_in_comments(tmp_path: Path) -> None:
+def test_images_named_in_comments_of_meshlab_are_read(tmp_path: Path) -> None:
     for name in ("a b.png", "c.png"):
         (tmp_path / name).write_bytes(IMAGE)
     content = (
@@ -273,7 +273,7 @@ def test_colours_of_binary_stl_files(tmp_path: Path, content: bytes, colors) -> 
     assert found == colors
 
 
-def test_stl_files_that_end_early_or_late(tmp_path: Path) -> None:
+def test_stl_files_that_end_early_are_refused_and_extra_bytes_are_noted(tmp_path: Path) -> None:
     late = load_mesh(written(tmp_path, "a.stl", stl([0, 0], more=b"21 bytes more, or so.")))
     assert late.notes[0] == "21 bytes behind the triangles left out" and len(late.F) == 2
     with pytest.raises(MeshError, match="ends early: 2 triangles are announced, data of 1 follow"):

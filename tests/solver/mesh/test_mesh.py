@@ -37,7 +37,7 @@ def test_normals_of_a_sphere_are_radial() -> None:
     np.testing.assert_allclose(ball.vertex_normals, ball.V, atol=0.02)
 
 
-def test_the_normal_of_a_spike_points_outwards_of_the_one_triangle_that_faces_elsewhere() -> None:
+def test_the_normal_of_a_spike_points_outwards_of_every_triangle() -> None:
     # many narrow triangles face up, two wide ones down and to the side: their mean would point into
     # those
     angle = np.concatenate([np.linspace(0, np.pi, 24), [1.5 * np.pi]])

@@ -7,7 +7,7 @@ import trimesh
 from ripple_sim.solver.mesh import ClosestPoints, RayScene, downward_hits, rays
 
 
-def test_triangles_without_area_and_triangles_in_one_place() -> None:
+def test_closest_points_allow_degenerate_and_coincident_triangles() -> None:
     V = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
     F = np.array([[0, 0, 0], [0, 1, 2], [1, 1, 2], *[[0, 1, 3]] * 9])
     points = np.array([[0.0, 0, 1], [1.5, -1, 0], [3, 0, 0], [0.2, 0.2, -2], [-1, 5, 0]])
@@ -31,7 +31,7 @@ def test_heights_on_a_slope_are_those_of_its_plane() -> None:
         np.testing.assert_allclose(z, 0.5 * xy[:, 0] - 0.25 * xy[:, 1], atol=1e-5)
 
 
-def test_the_upper_of_two_surfaces_is_met() -> None:
+def test_a_vertical_ray_hits_the_upper_of_two_surfaces() -> None:
     low, high = (trimesh.creation.box(extents=[s, s, 1]) for s in (4, 2))
     high.apply_translation([0, 0, 5])
     ray = 0.5 + 5 + 4  # embree's float32 has steps of 1e-6 there

@@ -64,7 +64,7 @@ def test_a_shell_with_a_small_hole_is_solid_and_one_with_a_wide_hole_stays_hollo
 
 
 @pytest.mark.parametrize("cracked", [False, True])
-def test_a_ring_keeps_its_hole_even_as_a_thousand_bits(cracked: bool) -> None:
+def test_a_wrapped_ring_keeps_its_hole_even_if_it_is_cracked(cracked: bool) -> None:
     V, F = torus()
     if cracked:
         middle = V[F].mean(axis=1, keepdims=True)
@@ -84,7 +84,7 @@ def test_a_lone_triangle_and_a_needle_are_wrapped() -> None:
         assert distances(found).max() < 1.5
 
 
-def test_the_surface_carries_the_object_along() -> None:
+def test_the_wrapped_object_moves_with_its_surface() -> None:
     mesh = joined(Mesh.from_arrays(*cube()), moved(sphere(3), (0.2, 0, 0), 0.4))
     found = wrap(mesh, 0.05)
     assert found.triangles.shape == (len(mesh.V),)

@@ -68,9 +68,7 @@ def test_a_narrow_ring_is_not_softened() -> None:
     assert square_frequency == pytest.approx((np.pi / x[-1]) ** 2, rel=1e-4)
 
 
-def test_a_smooth_surface_gains_time_steps_and_keeps_its_mass_and_eigenvalues_of_second_order() -> (
-    None
-):
+def test_smooth_surfaces_gain_time_step_and_keep_mass_and_order_of_eigenvalues() -> None:
     errors = []
     for n in (24, 48, 96):
         u = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)  # a unit square, dense in the middle
@@ -241,7 +239,7 @@ def test_waves_come_back_inverted_from_a_fixed_rim_and_upright_from_a_free_one()
         assert middle[np.abs(middle).argmax()] == pytest.approx(sign, abs=0.05)
 
 
-def test_a_closed_surface_knows_no_rim_and_a_bad_name_is_refused() -> None:
+def test_the_rim_of_a_closed_surface_has_no_effect_and_a_bad_name_is_refused() -> None:
     atlas = sphere_atlas(1.0, 8)
     heights = []
     for rim in ("free", "fixed"):

@@ -59,7 +59,7 @@ def test_a_square_plate_has_the_frequencies_of_the_tables(name: str, sheet) -> N
 @pytest.mark.parametrize(
     ("rim", "expected"), [("supported", 4.935), ("clamped", 10.216), ("free", 5.358)]
 )
-def test_a_round_plate_has_them_too(rim: str, expected: float) -> None:
+def test_a_round_plate_has_the_frequencies_of_the_tables(rim: str, expected: float) -> None:
     found = 2 * np.pi * modes(texel_atlas(disk(20)), PLATE, 1, rim=rim).frequencies
     assert found[0] == pytest.approx(expected, rel=0.01)
 

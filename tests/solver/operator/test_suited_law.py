@@ -75,7 +75,7 @@ def test_invalid_sizes_and_hits_are_refused(size: float, hit: object, message: s
         Material.suited(size, hit)
 
 
-def test_the_stiffness_under_a_load_holds_it_at_the_depth_or_above() -> None:
+def test_a_load_sinks_at_most_to_the_depth_that_chose_the_stiffness() -> None:
     atlas = sphere_atlas(1.0, 64)
     force = 20.0
     radius = 0.2

@@ -254,7 +254,7 @@ def test_invalid_conserve_volume_is_refused() -> None:
         WaveSolver(SHEET, backend="cpu", conserve_volume="auto")
 
 
-def test_a_change_of_the_choice_reaches_copies_and_states(backend: str) -> None:
+def test_copies_and_states_take_over_a_change_of_conserve_volume(backend: str) -> None:
     waves = WaveSolver(SHEETS, Material(stiffness=field(SHEETS, 0)), backend=backend)
     twin = copy.copy(waves)
     for each in (waves, twin):

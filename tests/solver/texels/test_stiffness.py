@@ -13,7 +13,7 @@ STRAIGHT = (0.0,) * 6
 
 
 @pytest.mark.parametrize(("long", "angle"), [(1.0, 30.0), (2.0, 35.0), (3.0, 20.0), (1.3, 150.0)])
-def test_waves_over_sheared_quads_are_in_time_in_the_mean_over_their_directions(
+def test_waves_over_sheared_quads_are_in_time_on_average_over_directions(
     long: float, angle: float
 ) -> None:
     east = np.array([long, 0.0, 0.0])
@@ -195,7 +195,7 @@ def test_charts_turned_against_each_other_and_a_rim_make_the_same_surface() -> N
         np.testing.assert_allclose(texels.areas, 1 / n**2)
 
 
-def test_media_in_series_carry_the_same_flux() -> None:
+def test_layers_in_series_carry_the_same_flux() -> None:
     n = 6
     columns = np.array([1.0, 5.0, 0.2, 3.0, 3.0, 0.5])
     texels = square(n)

@@ -62,7 +62,7 @@ def test_new_positions_keep_the_topology() -> None:
     )
 
 
-def test_momentum_of_an_impulse_on_a_rim_and_an_irregular_vertex() -> None:
+def test_impulses_at_a_rim_and_at_an_irregular_vertex_keep_their_momentum() -> None:
     texels = polygon(5, 12)
     for point in ([0.0, 0, 0], texels.positions[2, 4, -1]):
         waves = WaveSolver(
@@ -84,7 +84,7 @@ def test_a_rectangle_is_covered_by_texels_as_long_and_as_wide_as_its_sides_say()
     assert 1 / np.sqrt(3) < timestep < 1
 
 
-def test_coverage_follows_the_areas_of_the_texels_and_spanned_their_places() -> None:
+def test_coverage_depends_on_texel_areas_and_spanned_on_texel_positions() -> None:
     texels = square(4)
     mesh = texel_atlas(texels).mesh
     heavy = dataclasses.replace(texels, areas=3 * texels.areas)
@@ -94,7 +94,7 @@ def test_coverage_follows_the_areas_of_the_texels_and_spanned_their_places() -> 
     assert texel_quality(ends, mesh)["spanned"] == pytest.approx(np.square(3 / 4))
 
 
-def test_the_time_step_is_that_of_waves_over_an_even_grids() -> None:
+def test_the_quality_timestep_is_relative_to_an_even_grid() -> None:
     even, uneven = (texel_atlas(each) for each in (flat_torus(12), disk(12)))
     assert even.quality()["timestep"] == pytest.approx(1, rel=5e-3)
     steps = [WaveSolver(atlas, backend="cpu").stable_timestep for atlas in (even, uneven)]
@@ -107,7 +107,7 @@ def test_the_time_step_is_that_of_waves_over_an_even_grids() -> None:
 
 
 @pytest.mark.parametrize(("k", "m"), [(0, 0), (1, 0), (2, 3), (6, 6)])
-def test_waves_on_a_torus_fade_as_cos_to_the_eighth_of_half_their_phase(k: int, m: int) -> None:
+def test_smoothing_damps_waves_on_a_torus_by_the_exact_factor(k: int, m: int) -> None:
     n = 12
     row, column = np.indices((n, n))
     wave = np.cos(2 * np.pi * (k * column + m * row) / n)[None]

@@ -21,7 +21,7 @@ from ripple_sim.solver.texels import LEAST, half_thickness, medial_radius
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
-def test_of_a_sphere_they_are_the_radius_at_any_scale(radius: float) -> None:
+def test_half_thickness_and_medial_radius_of_a_sphere_are_its_radius(radius: float) -> None:
     atlas = sphere_atlas(radius, 16)
     np.testing.assert_allclose(half_thickness(atlas), radius, rtol=0.01)
     np.testing.assert_allclose(medial_radius(atlas), radius, rtol=2e-3)
@@ -77,7 +77,7 @@ def test_voxels_with_noise_give_the_same_within_a_voxel() -> None:
     assert np.abs(thickness_map(atlas, volume) - thickness_map(atlas, ball(centre))).max() < voxel
 
 
-def test_of_several_bodies_the_nearest_counts() -> None:
+def test_the_thickness_over_several_bodies_is_to_the_nearest_one() -> None:
     atlas = sphere_atlas(1.0, 16)
     both = thickness_map(atlas, [ball((0, 0, 0), 0.3), ball((0, 0, 0))])
     np.testing.assert_allclose(both, thickness_map(atlas, ball((0, 0, 0))))

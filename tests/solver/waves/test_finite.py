@@ -43,7 +43,7 @@ from ripple_sim.solver import Material, RippleError, SolverError, WaveSolver, sp
         ),
     ],
 )
-def test_bad_values_are_named(call, message: str) -> None:
+def test_invalid_values_are_refused_with_their_names(call, message: str) -> None:
     with pytest.raises(RippleError, match=message):
         call(WaveSolver(sphere_atlas(1.0, 8), backend="cpu"))
 
@@ -103,9 +103,7 @@ READ = {
 
 
 @pytest.mark.parametrize("name", READ)
-def test_nothing_that_is_not_finite_leaves_the_solver_without_an_error(
-    name: str, backend: str
-) -> None:
+def test_reading_values_that_are_not_finite_is_an_error(name: str, backend: str) -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend=backend)
     waves._backend.fields.set_height(np.full((6, 8, 8), np.nan, np.float32))
     waves._backend.set_velocity(np.full((6, 8, 8), np.nan, np.float32))
@@ -132,7 +130,9 @@ def test_a_step_whose_coefficients_are_beyond_float32_is_refused() -> None:
         waves.step(1e39)
 
 
-def test_a_velocity_that_is_not_finite_before_the_height_is_no_secret(backend: str) -> None:
+def test_a_velocity_that_is_not_finite_is_reported_before_the_height_is_affected(
+    backend: str,
+) -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend=backend)
     velocity = np.zeros((6, 8, 8), np.float32)
     velocity[1, 2, 3] = np.inf

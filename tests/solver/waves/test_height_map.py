@@ -107,7 +107,7 @@ def page_of(gl: GLContext, height_map: HeightMap, heights: np.ndarray) -> tuple[
 
 
 @pytest.mark.parametrize("shape", ["sphere", "hexagon", "free disk", "fixed disk", "fixed hexagon"])
-def test_the_page_is_the_hosts_height_map(hardware, shape) -> None:
+def test_the_page_on_the_gpu_equals_the_height_map_on_the_cpu(hardware, shape) -> None:
     texels = {
         "sphere": lambda n: sphere_atlas(1.0, n).texels,
         "hexagon": partial(polygon, 6),
@@ -185,7 +185,7 @@ def test_heights_up_to_a_quarter_of_the_radius_are_drawn_as_they_are() -> None:
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_beyond_it_the_drawn_height_grows_smoothly_towards_the_limit(sign: int) -> None:
+def test_the_drawn_height_grows_smoothly_towards_the_limit(sign: int) -> None:
     limit = DisplacementLimit(ATLAS)
     heights = np.linspace(0.3, 8.0, 800)
     seen = np.array([sign * limit(np.full(SHAPE, sign * h, np.float32))[0, 6, 6] for h in heights])

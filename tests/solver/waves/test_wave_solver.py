@@ -33,7 +33,7 @@ def test_frequency_scales_with_speed_over_radius(radius: float, speed: float) ->
     np.testing.assert_allclose(waves.height, -start, atol=5e-3)
 
 
-def test_superposition(animal: Atlas, backend: str) -> None:
+def test_waves_of_two_impulses_add_up(animal: Atlas, backend: str) -> None:
     def run(*impulses: tuple[np.ndarray, float]) -> np.ndarray:
         waves = WaveSolver(animal, Material(speed=0.5), backend=backend)
         for point, impulse in impulses:

@@ -200,14 +200,14 @@ def test_a_surface_too_long_for_its_width_is_refused_at_once(stretch: float) -> 
         build_atlas(long, 16, cache=False, layout="patches")
 
 
-def test_a_surface_a_little_too_long_for_so_many_cells_has_fewer(
+def test_a_surface_slightly_too_long_gets_fewer_cells(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(quads, "_MAX_LENGTH_TIMES_CELLS", 20**2)
     assert_atlas_carries_waves(build_atlas(ANY_MESH["strip"](), 16, cache=False, layout="patches"))
 
 
-def test_many_parts_none_of_which_has_a_share_to_speak_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_parts_of_negligible_area_carry_waves(monkeypatch: pytest.MonkeyPatch) -> None:
     """As with a thousand parts, in less time."""
     monkeypatch.setattr(layout, "_NEGLIGIBLE_AREA", 0.3)
     solid = trimesh.creation.box((1, 1, 1))

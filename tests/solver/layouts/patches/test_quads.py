@@ -168,7 +168,7 @@ def test_a_triangle_without_area_is_opened_before_the_map_is_evened_out(quads: Q
     assert_one_to_one(seamless)
 
 
-def test_the_slope_of_newtons_system_is_that_of_the_energy(quads: Quads) -> None:
+def test_newtons_gradient_is_the_slope_of_the_energy(quads: Quads) -> None:
     seamless = patches.seamless_map(quads)
     reference = patches.reference_of(quads.surface.V, quads.surface.F, len(quads.glued))
     edges = edges_of(seamless.F)
@@ -247,7 +247,7 @@ def test_the_best_of_all_pairings_is_found(points: int) -> None:
     assert (found + 2 * np.maximum(found - 1, 0)).sum() == min(cost)
 
 
-def test_where_their_number_is_odd_one_triangle_stays_alone() -> None:
+def test_one_of_an_odd_number_of_triangles_stays_alone() -> None:
     # three in a row, round points that have enough of others
     joints = (
         np.array([[0, 1], [1, 2], [0, -1], [2, -1]]),

@@ -81,7 +81,7 @@ def test_limbs_get_their_share_of_the_sphere():
 @pytest.mark.parametrize(
     ("name", "bound"), [("spot.obj", 1.9), ("bunny.off", 2.0), ("elephant.obj", 2.0)]
 )
-def test_known_mesh(name, bound):
+def test_known_meshes_have_certified_maps_of_bounded_stretch(name, bound):
     mesh = trimesh.load(known_mesh(f"good/{name}"), process=False)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     V, F = solid(mesh)
@@ -123,7 +123,7 @@ def assert_certified(V, F):
 
 @EXAMPLES
 @given(seed=SEEDS, points=st.integers(4, 400), factors=st.tuples(*[st.floats(0.05, 1)] * 3))
-def test_convex_hulls_of_random_points(seed, points, factors):
+def test_convex_hulls_of_random_points_get_certified_maps(seed, points, factors):
     hull = trimesh.convex.convex_hull(
         np.random.default_rng(seed).standard_normal((points, 3)) * factors
     )
@@ -160,7 +160,7 @@ def test_thin_limbs_keep_their_texels(length, radius):
 
 @EXAMPLES
 @given(seed=SEEDS, power=st.floats(0, 4))
-def test_very_uneven_triangles(seed, power):
+def test_very_uneven_triangles_get_an_even_map(seed, power):
     """A mesh with triangles a hundred times smaller on one side gets an even map."""
     V, F = icosphere(4)
     pole = np.random.default_rng(seed).standard_normal(3)
