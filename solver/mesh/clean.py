@@ -229,7 +229,7 @@ def _without_longest_slivers(
     rank = np.full(len(F), -1)
     rank[np.lexsort((length.max(axis=1), sliver))] = np.arange(len(F))
     rank[~sliver] = -1
-    edge = edges_of(F).of
+    edge = edges_of(F).of_side
     highest = np.full(edge.max() + 1, -1)
     np.maximum.at(highest, edge, np.repeat(rank[:, None], 3, axis=1))
     removed = sliver & (highest[edge] == rank[:, None]).all(axis=1)

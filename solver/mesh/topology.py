@@ -41,14 +41,14 @@ class Edges(NamedTuple):
     ----------
     ends : int64 [e, 2]
         The lower vertex first.
-    of : int64 [m, 3]
+    of_side : int64 [m, 3]
         The edge on which each side of each triangle lies.
     sides : int64 [e, 2]
         The two sides that lie on each edge; -1 in the place of a second one at a rim.
     """
 
     ends: Ints
-    of: Ints
+    of_side: Ints
     sides: Ints
 
     @property

@@ -60,7 +60,7 @@ class AdaptiveTessellation:
         positions = vertices.attributes[:, POSITION]
         self.base_count = len(positions) - len(edges.ends)
         self.faces = np.asarray(vertices.F, np.int32)
-        self.sides = np.asarray(edges.of, np.int32)
+        self.sides = np.asarray(edges.of_side, np.int32)
         self.length = np.linalg.norm(
             positions[edges.ends[:, 1]] - positions[edges.ends[:, 0]], axis=1
         )

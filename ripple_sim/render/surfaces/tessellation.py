@@ -79,7 +79,7 @@ def tessellate(
         midpoint[marked] = len(attributes) + np.arange(marked.sum())
         same = np.concatenate([same, same.max() + 1 + weld[marked]])
         attributes = np.concatenate([attributes, midpoints(edges.ends, inner, attributes)[marked]])
-        F = _split(F, midpoint[edges.of], attributes[:, POSITION])
+        F = _split(F, midpoint[edges.of_side], attributes[:, POSITION])
     return F, attributes, same
 
 
@@ -94,7 +94,7 @@ def welded(
     """
     _, weld_of_side = np.unique(undirected(same[F])[0], return_inverse=True)
     weld = np.empty(len(edges.ends), dtype=np.int64)
-    weld[edges.of.ravel()] = weld_of_side
+    weld[edges.of_side.ravel()] = weld_of_side
     return weld, np.bincount(weld_of_side)[weld] == 2
 
 

@@ -79,7 +79,7 @@ def rounded_parts(
     attributes = np.concatenate([mesh.V[vertices], split_normals], axis=1)
     edges = edges_of(F)
     _, inner = welded(edges, F, np.arange(len(attributes)))
-    out = bulges(edges.ends, inner, attributes)[edges.of]
+    out = bulges(edges.ends, inner, attributes)[edges.of_side]
     V = parts.V.copy()
     w = parts.barycentrics
     V[parts.F] += 4 * np.einsum("pck,pck,pkj->pcj", w, np.roll(w, -1, axis=2), out[parts.triangle])
@@ -252,7 +252,7 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     places = charts.page.places(chart, chart_uv)
     points = np.hstack([attributes[:, POSITION], attributes[:, DIRECTION]])
     lookups = shared_places(chart_uv, places, points)
-    corners = np.concatenate([faces, len(chart) - len(edges.ends) + edges.of])
+    corners = np.concatenate([faces, len(chart) - len(edges.ends) + edges.of_side])
     balls = balls_about(attributes[:, POSITION][corners], _BALLS)
     own = attributes[: len(same)]  # without midpoints
     apart = _SIDE_DISTANCE * np.ptp(points, axis=0)[:3].max() / 2 * own[:, DIRECTION]

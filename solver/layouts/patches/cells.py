@@ -261,7 +261,7 @@ def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
         _MIN_EDGE_SHARE,
         1 - _MIN_EDGE_SHARE,
     )
-    cut = surface.subdivided(np.where(between, place, np.nan), _CUTS)[0]
+    cut = surface.subdivided(np.where(between, place, np.nan), _CUTS).surface
     # each triangle has a vertex of the surface before, and all of those are of its cell
     cell = np.pad(cells.label, (0, len(cut.V) - len(surface.V)), constant_values=-1)[cut.F].max(
         axis=1

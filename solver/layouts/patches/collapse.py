@@ -1,15 +1,18 @@
-"""Taking away vertices that only cuts have made, by half-edge collapses that fold nothing.
+"""Removes vertices that only cuts have made, by half-edge collapses that fold nothing.
 
 Cuts along the borders of cells and charts leave three times as many triangles as there were, most
-of them slivers. Once the charts are known to the map, the cuts are not needed any more. In each
-round the best collapses are done, none of two neighbours, so that all are judged on the same
-triangles.
+of them slivers. Once the map knows the charts, the cuts are not needed any more. A half-edge
+collapse moves a vertex u onto a neighbour v: the triangles at both disappear, and the other
+triangles of u get the corner v.
 
-A half-edge collapse must meet the link condition, keep every triangle inside its parent on the
-mesh, and turn none over, neither there nor on the charts.
+A collapse must meet the link condition, keep every triangle inside its parent on the mesh, and turn
+no triangle over, neither on the mesh nor on the charts. Each round does the best collapses, none of
+two neighbours, so that all of them are judged on the same triangles.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,22 +25,20 @@ from .seamless import (
     corner_place,
     frame_of,
     inverse,
+    place_seen_from,
     square,
     stars,
-    turned,
     wedge,
 )
 from .surface import TriangleSurface
 
-# Double area over squared length of a triangle on the charts after a collapse, at least. Where a
-# triangle is flatter already, such as a piece of a needle, a collapse must make none flatter.
+# Double area over squared longest side of a triangle on the charts after a collapse, at least.
+# Where a triangle is flatter already, such as a piece of a needle, the collapse must make no
+# triangle flatter than that one.
 _MIN_FLATNESS = 0.05
 
 # Double area of a triangle in its parent, in barycentric coordinates, at least.
 _MIN_AREA_IN_PARENT = 1e-9
-
-# Where the triangles lie on the mesh: parent [m], and barycentrics in it of their corners [m, 3, 3]
-Parents = tuple[Ints, Floats]
 
 # Rounds of collapses, at most.
 _MAX_ROUNDS = 20
@@ -46,114 +47,211 @@ _MAX_ROUNDS = 20
 _MIN_COLLAPSED_SHARE = 0.01
 
 
+class Parents(NamedTuple):
+    """Where triangles lie on the mesh."""
+
+    triangle: Ints  # the triangle of the mesh around each, [m]
+    inside: Floats  # barycentric coordinates in it of the three corners, [m, 3, 3]
+
+
+class Collapsed(NamedTuple):
+    """The old triangles after some collapses."""
+
+    remains: Bools  # the triangles that are not gone, [m]
+    F: Ints  # vertices, [m, 3]
+    turn: Ints  # the change of frames at each corner, see `SeamlessMap`, [m, 3]
+    shift: Complex  # [m, 3]
+    inside: Floats  # see `Parents`, [m, 3, 3]
+
+
+def without_cuts(
+    surface: TriangleSurface, seamless: SeamlessMap, cut: Bools
+) -> tuple[TriangleSurface, SeamlessMap]:
+    """The same map on fewer triangles: vertices `cut` [n] are gone where that folds nothing."""
+    parents = Parents(surface.parent, np.ascontiguousarray(surface.inside))
+    count = len(seamless.z)
+    worth = np.zeros(count)
+    target = np.full(count, -1)
+    changed = cut
+    for _ in range(_MAX_ROUNDS):
+        _find_targets(seamless, parents, cut & changed, surface.at_rim, worth, target)
+        chosen = _best_collapses(seamless, np.argsort(-worth, kind="stable"), worth, target)
+        if chosen.sum() <= _MIN_COLLAPSED_SHARE * cut.sum():
+            break
+        collapsed = _collapse(seamless, parents, chosen, target)
+        remains = collapsed.remains
+        # what a collapse is worth depends on the stars of a vertex and of its neighbours
+        changed = _with_neighbours(seamless.F, _with_neighbours(seamless.F, chosen))
+        new_number = np.cumsum(remains) - 1
+        target = np.where(changed, -1, 3 * new_number[target // 3] + target % 3)
+        seamless = _remaining(seamless, collapsed)
+        parents = Parents(parents.triangle[remains], collapsed.inside[remains])
+    return _without_unused_vertices(surface.V, seamless, parents)
+
+
+def _remaining(seamless: SeamlessMap, collapsed: Collapsed) -> SeamlessMap:
+    """The map on the triangles that remain after collapses, with the old vertices."""
+    remains = collapsed.remains
+    F = collapsed.F[remains]
+    star_start, star = stars(F, len(seamless.z))
+    return seamless._replace(
+        F=F,
+        frame=seamless.frame[remains],
+        turn=collapsed.turn[remains],
+        shift=collapsed.shift[remains],
+        star_start=star_start,
+        star=star,
+    )
+
+
+def _without_unused_vertices(
+    V: Floats, seamless: SeamlessMap, parents: Parents
+) -> tuple[TriangleSurface, SeamlessMap]:
+    """The surface and the map of the vertices V [n, 3] [m] that have a triangle."""
+    used, F = np.unique(seamless.F, return_inverse=True)
+    star_start, star = stars(F, len(used))
+    seamless = seamless._replace(
+        F=F,
+        chart=seamless.chart[used],
+        z=seamless.z[used],
+        freedom=seamless.freedom[used],
+        star_start=star_start,
+        star=star,
+    )
+    return TriangleSurface(V[used], F, parents.triangle, parents.inside), seamless
+
+
+def _with_neighbours(F: Ints, chosen: Bools) -> Bools:
+    """Chosen vertices [n] and all that share one of the triangles F [m, 3] with them."""
+    wider = chosen.copy()
+    wider[F[chosen[F].any(axis=1)]] = True
+    return wider
+
+
 @kernel
 def _find_targets(
     seamless: SeamlessMap,
     parents: Parents,
-    chosen: Bools,
+    candidates: Bools,
     at_rim: Bools,
     worth: Floats,
     target: Ints,
 ) -> None:
-    """Fill in how good the best collapse of chosen vertices is, and to which corner it leads.
+    """Find the best collapse of each candidate [n]: fill in its `worth` and its `target` [n].
 
-    It is above 0 where there is one. Corner k of triangle f has the number 3 f + k.
+    The worth is positive if there is a collapse, and 0 if not. The target is the number 3 f + k of
+    a corner k of a triangle f, at the neighbour onto which the vertex moves.
     """
-    n = len(seamless.z)
-    seen = np.full(n, -1)
-    for u in range(n):
-        first = seamless.star_start[u]
-        last = seamless.star_start[u + 1]
-        if not chosen[u]:
+    count = len(seamless.z)
+    mark = np.full(count, -1)
+    for u in range(count):
+        if not candidates[u]:
             continue
         worth[u] = 0.0
         target[u] = -1
-        if seamless.freedom[u] == FIXED or first == last:
+        start = seamless.star_start[u]
+        end = seamless.star_start[u + 1]
+        if seamless.freedom[u] == FIXED or start == end:
             continue
-        for i in range(first, last):
+        _mark_neighbours(seamless, u, mark)
+        # inside the surface each neighbour is the next corner of one triangle; at a rim the last
+        # neighbour is not
+        corners_to_try = 1 if seamless.freedom[u] == FREE else 2
+        for i in range(start, end):
             f = seamless.star[i] // 3
             k = seamless.star[i] % 3
-            for j in (1, 2):
-                seen[seamless.F[f, (k + j) % 3]] = u
-        for i in range(first, last):
-            f = seamless.star[i] // 3
-            k = seamless.star[i] % 3
-            for j in range(1, 2 if seamless.freedom[u] == FREE else 3):  # each neighbour once
+            for j in range(1, 1 + corners_to_try):
                 m = (k + j) % 3
-                good = _worth(seamless, parents, at_rim, u, f, k, m)
-                if good > worth[u] and _meets(seamless, u, seamless.F[f, m], seen):
-                    worth[u] = good
+                v = seamless.F[f, m]
+                width = _worth(seamless, parents, at_rim, u, f, k, m)
+                if width > worth[u] and _meets_link_condition(seamless, u, v, mark):
+                    worth[u] = width
                     target[u] = 3 * f + m
 
 
 @kernel
-def _meets(seamless: SeamlessMap, u: int, v: int, seen: Ints) -> bool:
-    """The link condition for u and v: they share as many neighbours as triangles.
+def _mark_neighbours(seamless: SeamlessMap, u: int, mark: Ints) -> None:
+    """Write u into `mark` [n] at all neighbours of vertex u."""
+    for i in range(seamless.star_start[u], seamless.star_start[u + 1]):
+        f = seamless.star[i] // 3
+        k = seamless.star[i] % 3
+        for j in (1, 2):
+            mark[seamless.F[f, (k + j) % 3]] = u
 
-    The neighbours of u are marked in `seen`.
+
+@kernel
+def _meets_link_condition(seamless: SeamlessMap, u: int, v: int, mark: Ints) -> bool:
+    """Whether u and v have as many common neighbours as common triangles.
+
+    The neighbours of u are marked with u in `mark` [n]. Here those that are counted get another
+    mark for a while.
     """
-    inner = seamless.freedom[u] == FREE
-    if seamless.freedom[v] == FREE and not inner:
+    u_is_inner = seamless.freedom[u] == FREE
+    v_is_inner = seamless.freedom[v] == FREE
+    if v_is_inner and not u_is_inner:
         return False
-    shared = beside = 0
-    first = seamless.star_start[v]
-    last = seamless.star_start[v + 1]
-    for i in range(first, last):
+    counted = -2 - u
+    common_neighbours = 0
+    common_triangles = 0
+    start = seamless.star_start[v]
+    end = seamless.star_start[v + 1]
+    for i in range(start, end):
         f = seamless.star[i] // 3
         k = seamless.star[i] % 3
         for j in (1, 2):
             w = seamless.F[f, (k + j) % 3]
-            beside += w == u
-            if seen[w] == u:  # each once
-                seen[w] = -2 - u
-                shared += 1
-    for i in range(first, last):
+            if w == u:
+                common_triangles += 1
+            if mark[w] == u:
+                mark[w] = counted
+                common_neighbours += 1
+    for i in range(start, end):
         f = seamless.star[i] // 3
         k = seamless.star[i] % 3
         for j in (1, 2):
             w = seamless.F[f, (k + j) % 3]
-            if seen[w] == -2 - u:
-                seen[w] = u
-    return shared == beside and beside == (2 if inner else 1)
+            if mark[w] == counted:
+                mark[w] = u
+    expected_triangles = 2 if u_is_inner else 1
+    return common_neighbours == common_triangles and common_triangles == expected_triangles
 
 
 @kernel
 def _worth(
     seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: int, k: int, m: int
 ) -> float:
-    """Width of the flattest triangle on the charts if u goes to corner m; 0 if it may not.
+    """Flatness of the flattest triangle on the charts if u moves to v; 0 if it must not.
 
-    u is corner k of triangle f.
+    u is corner k of triangle f, and v its corner m. All places are in the frame of u.
     """
     v = seamless.F[f, m]
-    held = seamless.freedom[v] == FIXED
-    if held and at_rim[v]:
+    v_is_tip = seamless.freedom[v] == FIXED
+    if v_is_tip and at_rim[v]:
         return 0.0  # the frames round a corner of a rim stay as they are
-    turn, shift = inverse(frame_of(seamless, f, k))
-    goal = turned(corner_place(seamless, f, m), turn) + shift
-    flattest = np.inf
+    goal = place_seen_from(seamless, f, k, m)
+    flattest_after = np.inf
     flattest_before = np.inf
     for i in range(seamless.star_start[u], seamless.star_start[u + 1]):
         g = seamless.star[i] // 3
         c = seamless.star[i] % 3
+        flattest_before = min(flattest_before, _flatness(seamless, g))
         p = (c + 1) % 3
         q = (c + 2) % 3
         a = seamless.F[g, p]
         b = seamless.F[g, q]
-        flattest_before = min(flattest_before, _flatness(seamless, g))
         if a == v or b == v:
-            continue
-        # two tips in a triangle would leave it no way to move
-        if held and (seamless.freedom[a] == FIXED or seamless.freedom[b] == FIXED):
+            continue  # this triangle disappears
+        # a triangle with two tips could not move any more
+        if v_is_tip and (seamless.freedom[a] == FIXED or seamless.freedom[b] == FIXED):
             return 0.0
-        if not _inside(seamless, parents, g, p, q, v):
+        if not _stays_in_parent(seamless, parents, g, p, q, v):
             return 0.0
-        turn, shift = inverse(frame_of(seamless, g, c))
-        to_a = turned(corner_place(seamless, g, p), turn) + shift - goal
-        to_b = turned(corner_place(seamless, g, q), turn) + shift - goal
-        longest = max(square(to_a), square(to_b), square(to_a - to_b))
-        flattest = min(flattest, wedge(to_a, to_b) / longest)
-    return flattest if flattest > min(_MIN_FLATNESS, flattest_before) else 0.0
+        to_a = place_seen_from(seamless, g, c, p) - goal
+        to_b = place_seen_from(seamless, g, c, q) - goal
+        longest_squared = max(square(to_a), square(to_b), square(to_a - to_b))
+        flattest_after = min(flattest_after, wedge(to_a, to_b) / longest_squared)
+    is_thick_enough = flattest_after > min(_MIN_FLATNESS, flattest_before)
+    return flattest_after if is_thick_enough else 0.0
 
 
 @kernel
@@ -166,122 +264,84 @@ def _flatness(seamless: SeamlessMap, f: int) -> float:
 
 
 @kernel
-def _inside(seamless: SeamlessMap, parents: Parents, g: int, p: int, q: int, v: int) -> bool:
-    """Whether v with corners p and q of triangle g makes a triangle inside the parent of g.
+def _stays_in_parent(
+    seamless: SeamlessMap, parents: Parents, g: int, p: int, q: int, v: int
+) -> bool:
+    """Whether v and the corners p and q of triangle g are a triangle inside the parent of g.
 
-    The triangle must be turned as g is.
+    It must have an area, and its orientation must be that of g.
     """
     for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
         h = seamless.star[i] // 3
         c = seamless.star[i] % 3
-        if parents[0][h] == parents[0][g]:
-            o = parents[1][h, c]
-            a = parents[1][g, p]
-            b = parents[1][g, q]
-            ux = a[1] - o[1]
-            uy = a[2] - o[2]
-            vx = b[1] - o[1]
-            vy = b[2] - o[2]
-            return ux * vy - uy * vx > _MIN_AREA_IN_PARENT
+        if parents.triangle[h] == parents.triangle[g]:
+            at_v = parents.inside[h, c]
+            at_p = parents.inside[g, p]
+            at_q = parents.inside[g, q]
+            # the second and third barycentric coordinates are coordinates in the plane
+            x_p = at_p[1] - at_v[1]
+            y_p = at_p[2] - at_v[2]
+            x_q = at_q[1] - at_v[1]
+            y_q = at_q[2] - at_v[2]
+            return x_p * y_q - y_p * x_q > _MIN_AREA_IN_PARENT
     return False
 
 
-def without_cuts(
-    surface: TriangleSurface, seamless: SeamlessMap, cut: Bools
-) -> tuple[TriangleSurface, SeamlessMap]:
-    """The same map on fewer triangles: vertices `cut` [n] are gone where that folds nothing."""
-    parents = surface.parent, np.ascontiguousarray(surface.inside)
-    count = len(seamless.z)
-    worth = np.zeros(count)
-    target = np.full(count, -1)
-    changed = cut
-    for _ in range(_MAX_ROUNDS):
-        _find_targets(seamless, parents, cut & changed, surface.at_rim, worth, target)
-        chosen = _chosen(seamless, np.argsort(-worth, kind="stable"), worth, target)
-        if chosen.sum() <= _MIN_COLLAPSED_SHARE * cut.sum():
-            break
-        left, F, turn, shift, inside = _collapse(seamless, parents, chosen, target)
-        # what a collapse is worth depends on the stars of a vertex and of its neighbours
-        changed = _with_neighbours(seamless.F, _with_neighbours(seamless.F, chosen))
-        number = np.cumsum(left) - 1
-        target = np.where(changed, -1, 3 * number[target // 3] + target % 3)
-        F = F[left]
-        frame = seamless.frame[left]
-        turn = turn[left]
-        shift = shift[left]
-        start, star = stars(F, len(seamless.z))
-        seamless = seamless._replace(
-            F=F, frame=frame, turn=turn, shift=shift, star_start=start, star=star
-        )
-        parents = parents[0][left], inside[left]
-    used, F = np.unique(seamless.F, return_inverse=True)
-    start, star = stars(F, len(used))
-    seamless = seamless._replace(
-        F=F,
-        chart=seamless.chart[used],
-        z=seamless.z[used],
-        freedom=seamless.freedom[used],
-        star_start=start,
-        star=star,
-    )
-    return TriangleSurface(surface.V[used], F, parents[0], parents[1]), seamless
-
-
-def _with_neighbours(F: Ints, chosen: Bools) -> Bools:
-    """Chosen vertices [n] and all that share one of the triangles F [m, 3] with them."""
-    wider = chosen.copy()
-    wider[F[chosen[F].any(axis=1)]] = True
-    return wider
-
-
 @kernel
-def _chosen(seamless: SeamlessMap, order: Ints, worth: Floats, target: Ints) -> Bools:
-    """The best collapses, none of two neighbours, and none that make the same edge."""
-    n = len(order)
-    chosen = np.zeros(n, np.bool_)
-    blocked = np.zeros(n, np.bool_)
-    made = {np.int64(-1)}
+def _best_collapses(seamless: SeamlessMap, order: Ints, worth: Floats, target: Ints) -> Bools:
+    """Choose vertices [n] to collapse: the best ones, no two neighbours, no new edge twice.
+
+    `order` [n] has all vertices, best first. For `worth` and `target` see `_find_targets`.
+    """
+    count = len(order)
+    chosen = np.zeros(count, np.bool_)
+    is_blocked = np.zeros(count, np.bool_)
+    new_edges = {np.int64(-1)}  # numba infers the type of a set from an element
     for u in order:
         if not worth[u] > 0.0:
             break
-        if blocked[u]:
+        if is_blocked[u]:
             continue
         v = seamless.F[target[u] // 3, target[u] % 3]
-        first = seamless.star_start[u]
-        last = seamless.star_start[u + 1]
-        free = True
-        for i in range(first, last):
+        start = seamless.star_start[u]
+        end = seamless.star_start[u + 1]
+        makes_edge_again = False
+        for i in range(start, end):
             f = seamless.star[i] // 3
             k = seamless.star[i] % 3
             for j in (1, 2):
-                w = seamless.F[f, (k + j) % 3]
-                free = free and (min(v, w) * n + max(v, w)) not in made
-        if not free:
+                edge = _edge_number(v, seamless.F[f, (k + j) % 3], count)
+                makes_edge_again = makes_edge_again or edge in new_edges
+        if makes_edge_again:
             continue
-        for i in range(first, last):
+        for i in range(start, end):
             f = seamless.star[i] // 3
             k = seamless.star[i] % 3
             for j in (1, 2):
                 w = seamless.F[f, (k + j) % 3]
-                blocked[w] = True
-                made.add(min(v, w) * n + max(v, w))
+                is_blocked[w] = True
+                new_edges.add(_edge_number(v, w, count))
         chosen[u] = True
     return chosen
 
 
 @kernel
-def _collapse(
-    seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints
-) -> tuple[Bools, Ints, Ints, Complex, Floats]:
-    """The triangles that are left, with changes of frames and the corners' places in their parents.
+def _edge_number(v: int, w: int, count: int) -> int:
+    """A number for the edge between two of `count` vertices."""
+    return min(v, w) * count + max(v, w)
 
-    Of all vertices: the changes to their frames, and where in their parents they lie.
+
+@kernel
+def _collapse(seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints) -> Collapsed:
+    """Move each chosen vertex [n] onto its target; see `_find_targets`.
+
+    No two chosen vertices are neighbours, so that a triangle has one of them at most.
     """
     F = seamless.F.copy()
     turn = seamless.turn.copy()
     shift = seamless.shift.copy()
-    inside = parents[1].copy()
-    left = np.ones(len(F), np.bool_)
+    inside = parents.inside.copy()
+    remains = np.ones(len(F), np.bool_)
     for f in range(len(F)):
         k = 0
         while k < 3 and not chosen[seamless.F[f, k]]:
@@ -292,17 +352,27 @@ def _collapse(
         g = target[u] // 3
         m = target[u] % 3
         v = seamless.F[g, m]
-        if v == seamless.F[f, 0] or v == seamless.F[f, 1] or v == seamless.F[f, 2]:
-            left[f] = False
+        if _corner_at(seamless.F, f, v) >= 0:
+            remains[f] = False
             continue
-        at_u = 0 if seamless.F[g, 0] == u else (1 if seamless.F[g, 1] == u else 2)
-        through_u = after(inverse(frame_of(seamless, g, at_u)), frame_of(seamless, f, k))
+        # from the frame of g by way of the frame of u to the frame of f
+        g_to_u = inverse(frame_of(seamless, g, _corner_at(seamless.F, g, u)))
+        g_to_f = after(g_to_u, frame_of(seamless, f, k))
         F[f, k] = v
-        turn[f, k], shift[f, k] = after(frame_of(seamless, g, m), through_u)
+        turn[f, k], shift[f, k] = after(frame_of(seamless, g, m), g_to_f)
         for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
             h = seamless.star[i] // 3
             c = seamless.star[i] % 3
-            if parents[0][h] == parents[0][f]:
+            if parents.triangle[h] == parents.triangle[f]:
                 for j in range(3):
-                    inside[f, k, j] = parents[1][h, c, j]
-    return left, F, turn, shift, inside
+                    inside[f, k, j] = parents.inside[h, c, j]
+    return Collapsed(remains, F, turn, shift, inside)
+
+
+@kernel
+def _corner_at(F: Ints, f: int, v: int) -> int:
+    """The corner of triangle f, of the triangles F [m, 3], at which vertex v lies; -1 if none."""
+    for k in range(3):
+        if F[f, k] == v:
+            return k
+    return -1

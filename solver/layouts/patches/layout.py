@@ -21,7 +21,16 @@ from ...mesh.clean import counted, place
 from ...mesh.topology import triangle_areas
 from ..energy import FIXED, FREE, Density, Reference, star_energy
 from .collapse import without_cuts
-from .energy import Star, energy_of, gather, reference_of, relax_all, scratch, sweep, sweep_all
+from .energy import (
+    Star,
+    energy_of,
+    fill_star,
+    reference_of,
+    relax_all,
+    star_buffers,
+    sweep,
+    sweep_all,
+)
 from .parts import (
     MAX_PARTS,
     MAX_STILL_SHARE,
@@ -99,7 +108,7 @@ def move_tips(seamless: SeamlessMap, reference: Reference, tips: Ints) -> Ints:
 
     Returns where the tips that moved are.
     """
-    return _move_tips(seamless, reference, tips, scratch(seamless))
+    return _move_tips(seamless, reference, tips, star_buffers(seamless))
 
 
 @kernel
@@ -198,7 +207,7 @@ def _moved(
     v = vertices[0]
     u = vertices[1]
     _change_frames(seamless, v, u, fan)
-    degree = gather(seamless, reference, v, 0j, star)
+    degree = fill_star(seamless, reference, v, 0j, star)
     _put_into_star(seamless, v, u, star, degree, reference.density)
     angle = 0.0
     for i in range(degree):

@@ -144,6 +144,13 @@ def corner_place(seamless: SeamlessMap, f: int, k: int) -> complex:
     return turned(seamless.z[seamless.F[f, k]], seamless.turn[f, k]) + seamless.shift[f, k]
 
 
+@kernel
+def place_seen_from(seamless: SeamlessMap, f: int, k: int, j: int) -> complex:
+    """Place of corner j of triangle f, in the frame of the vertex at its corner k."""
+    back = (4 - seamless.turn[f, k]) % 4
+    return turned(corner_place(seamless, f, j) - seamless.shift[f, k], back)
+
+
 def corner_places(seamless: SeamlessMap) -> Complex:
     """Places [m, 3] of the corners of all triangles in these triangles' frames."""
     return _TURNS[seamless.turn] * seamless.z[seamless.F] + seamless.shift

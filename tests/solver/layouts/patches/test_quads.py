@@ -136,7 +136,7 @@ def test_fewer_triangles_cover_the_same_surface_and_charts_once(mesh: Mesh, quad
     np.testing.assert_allclose(np.bincount(surface.parent, share), 1.0, rtol=1e-9)
     points = np.einsum("fij,fjk->fik", surface.inside, mesh.V[mesh.F[surface.parent]])
     np.testing.assert_allclose(points, surface.V[surface.F], atol=1e-12)
-    assert np.bincount(surface.edges.of.ravel()).max() == 2
+    assert np.bincount(surface.edges.of_side.ravel()).max() == 2
     assert (seamless.freedom == FIXED).sum() == (whole.freedom == FIXED).sum()
 
 
@@ -174,7 +174,7 @@ def test_newtons_gradient_is_the_slope_of_the_energy(quads: Quads) -> None:
     edges = edges_of(seamless.F)
     ends = edges.ends.astype(np.int32)
     system = System.zeros(len(seamless.z), len(ends))
-    patches.assemble(seamless, reference, edges.of, ends, system)
+    patches.assemble(seamless, reference, edges.of_side, ends, system)
     way = np.random.default_rng(0).normal(size=(len(seamless.z), 2))
     way[seamless.freedom == FIXED] = 0
     start = seamless.z.copy()
