@@ -136,7 +136,8 @@ class ShadowMaps:
         """Filter the maps in advance for the search for blockers, which widen penumbras."""
         self._blockers_target.use()
         self._depth.use(Unit.SHADOW_MAPS)
-        ctx.disable(moderngl.DEPTH_TEST)
+        # without blending, which would add what the new texture holds by chance
+        ctx.disable(moderngl.DEPTH_TEST | moderngl.BLEND)
         self._find_blockers.render(moderngl.TRIANGLES, vertices=3)
         ctx.enable(moderngl.DEPTH_TEST)
         self._blockers.build_mipmaps(max_level=_BLOCKER_LEVELS)

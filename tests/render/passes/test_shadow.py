@@ -1,5 +1,6 @@
 """Shadows: in place, lighter for transparent geoms, and none hides another."""
 
+import moderngl
 import numpy as np
 import pytest
 from drawn import BALL, FLOOR, FRONT, SIZE, SPOT, SUN, ball_surface, frame_of, light_of
@@ -151,6 +152,10 @@ def test_blockers_are_means_over_all_texels_of_the_shadow_map(gl, resources, fra
     ).astype("f4")
     with gl as ctx:
         maps._depth.write(depth)
+        # what was drawn before may have left blending on, and a new texture may hold anything
+        maps._blockers.write(np.ones((maps.size // 4, maps.size // 4, 4), "f4"))
+        ctx.enable(moderngl.BLEND)
+        ctx.blend_func = moderngl.ONE, moderngl.ONE
         maps.find_blockers(ctx)
         levels = [np.frombuffer(maps._blockers.read(level=level), "f4") for level in (0, 3)]
     away = depth * frame.values["shadows"][0]["depth"][0]
