@@ -24,6 +24,7 @@ from ripple_sim.solver.files import atomic_write
 __all__ = ["DUCK_FILE", "LIMBED_FILE", "duck", "limbed", "peanut", "polygonise", "write_obj"]
 
 Array = NDArray[np.float64]
+Triangles = NDArray[np.int64]
 Sdf = Callable[[Array], Array]
 
 DUCK_FILE = Path(__file__).parent / "meshes" / "duck.obj"
@@ -132,7 +133,7 @@ def _smooth_minimum(a: Array, b: Array, k: float) -> Array:
 
 def polygonise(
     sdf: Sdf, bounds: Sequence[ArrayLike], cell: float, smoothing: int = 12
-) -> tuple[Array, NDArray[np.int64]]:
+) -> tuple[Array, Triangles]:
     """Triangulate the surface sdf = 0 evenly, by marching cubes and smoothing along the surface.
 
     Parameters
@@ -176,12 +177,9 @@ def gradient(sdf: Sdf, points: Array, step: float = 1e-5) -> Array:
     return np.stack([sdf(points + e) - sdf(points - e) for e in h], axis=1) / (2 * step)
 
 
-def _relaxed(V: Array, F: NDArray[np.int64]) -> Array:
+def _relaxed(V: Array, F: Triangles) -> Array:
     adjacency = igl.adjacency_matrix(F)
     return (adjacency @ V) / np.asarray(adjacency.sum(axis=1))
-
-
-Triangles = NDArray[np.int64]
 
 
 def duck(cell: float = 0.0235) -> tuple[Array, Triangles]:
@@ -208,11 +206,10 @@ def limbed(cell: float = 0.02) -> tuple[Array, Triangles]:
 
     It is concave between the legs and under the chin.
     """
-    legs = [
-        capsule((x, y, 0.22), (1.25 * x, 1.4 * y, 0.05), 0.05)
-        for x in (-0.17, 0.17)
-        for y in (-0.09, 0.09)
-    ]
+    legs = []
+    for x in (-0.17, 0.17):
+        for y in (-0.09, 0.09):
+            legs.append(capsule((x, y, 0.22), (1.25 * x, 1.4 * y, 0.05), 0.05))
     trunk = ellipsoid((0.0, 0.0, 0.3), (0.27, 0.15, 0.14))
     neck = rounded_cone((0.18, 0.0, 0.34), (0.3, 0.0, 0.5), 0.08, 0.06)
     head = ellipsoid((0.33, 0.0, 0.52), (0.12, 0.085, 0.085))

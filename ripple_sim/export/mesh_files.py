@@ -124,8 +124,10 @@ class _FrameFiles:
 
     def _ply(self, data: mujoco.MjData, shapes: dict[str, Displaced]) -> bytes:
         """The surfaces in the world as one PLY, with normals and heights."""
-        points, normals, triangles = [], [], []
-        first = 0
+        points = []
+        normals = []
+        triangles = []
+        first = 0  # number of the surface's first point
         for name, shape in shapes.items():
             position, rotation = target_pose(data, self._source.ripples.geom_ids[name])
             points.append(shape.points @ rotation.T + position)
@@ -235,7 +237,7 @@ def _paint(
 
 
 def _untaken(name: str, taken: Container[str]) -> str:
-    """A name for a node: itself, or with a number where a node has it already."""
+    """A name for a node; with a number, if another node has this name already."""
     number = 1
     untaken = name
     while untaken in taken:
@@ -252,15 +254,12 @@ def _complete_materials(tree: dict[str, Any], linear_colors: dict[str, list[floa
     materials = tree.setdefault("materials", [])
     for material in materials:
         material["pbrMetallicRoughness"]["baseColorFactor"] = linear_colors[material["name"]]
-    bare = [
-        primitive
-        for mesh in tree["meshes"]
-        for primitive in mesh["primitives"]
-        if "material" not in primitive
-    ]
-    for primitive in bare:
+    bare_primitives = []
+    for mesh in tree["meshes"]:
+        bare_primitives += [part for part in mesh["primitives"] if "material" not in part]
+    for primitive in bare_primitives:
         primitive["material"] = len(materials)
-    if bare:
+    if bare_primitives:
         plain = {"metallicFactor": 0.0, "roughnessFactor": _HEATMAP_ROUGHNESS}
         materials.append({"name": "heights", "pbrMetallicRoughness": plain, "doubleSided": True})
 
@@ -285,5 +284,5 @@ def made_here(path: Path) -> bool:
     """Whether a file was made here, or a folder that has nothing but such files."""
     if path.is_dir():
         files = list(path.iterdir())
-        return all(each.suffix in (".ply", ".glb") and made_here(each) for each in files)
+        return all(file.suffix in (".ply", ".glb") and made_here(file) for file in files)
     return path.is_file() and file_made_here(path)

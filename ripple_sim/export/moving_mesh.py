@@ -147,7 +147,9 @@ class MovingMesh:
         )
         height_map = self._height_map(height)
         rates = self._height_map.rates(height, velocity)
-        points, directions, normals = self.rest, self.directions, self._normals
+        points = self.rest
+        directions = self.directions
+        normals = self._normals
         if V is not None:
             points, directions, normals = self.vertices(V)
             height_map = self._gradients(height_map, V)

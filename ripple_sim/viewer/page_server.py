@@ -111,10 +111,12 @@ class PageServer:
 
 
 def _send(connection: ServerConnection, stream: PageStream) -> None:
-    """Send a page what waits for it, until the end."""
+    """Send a page its messages, until there is None in their place."""
     with contextlib.suppress(ConnectionClosed):
-        while (message := stream.messages.get()) is not None:
+        message = stream.messages.get()
+        while message is not None:
             connection.send(message)
+            message = stream.messages.get()
         connection.close()
 
 

@@ -91,9 +91,14 @@ class Recorder:
     def free_path(self, ending: str) -> Path:
         """Path of a new file with an ending."""
         number = 1
-        while (path := self.folder / f"{self._name}-{number}{ending}").exists():
+        path = self._numbered_path(number, ending)
+        while path.exists():
             number += 1
+            path = self._numbered_path(number, ending)
         return path
+
+    def _numbered_path(self, number: int, ending: str) -> Path:
+        return self.folder / f"{self._name}-{number}{ending}"
 
 
 def _even(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:

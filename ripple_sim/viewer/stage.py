@@ -115,10 +115,16 @@ class BodyActors:
             if is_endless(model, geom, reach):
                 position, rotation = target_pose(session.simulation.data, geom)
                 self._actors[geom] = add_floor(plotter, (middle - position) @ rotation, reach, rgba)
-            elif (mesh := geom_mesh(model, geom)) is not None:
-                look = {"color": rgba[:3].tolist(), "opacity": float(rgba[3])}
+                continue
+            mesh = geom_mesh(model, geom)
+            if mesh is not None:
                 self._actors[geom] = plotter.add_mesh(
-                    mesh, interpolation="Phong", reset_camera=False, **look, **_SHADING
+                    mesh,
+                    color=rgba[:3].tolist(),
+                    opacity=float(rgba[3]),
+                    interpolation="Phong",
+                    reset_camera=False,
+                    **_SHADING,
                 )
         self.update()
 
@@ -179,12 +185,8 @@ class SkinActor:
         mapper = self.actor.mapper
         mesh.points[:] = shape.points
         data = mesh.GetPointData()
-        for array, new in (
-            (data.GetNormals(), shape.normals),
-            (data.GetArray(HEIGHT), _PER_METRE * shape.height),
-        ):
-            pv.convert_array(array)[:] = new
-            array.Modified()
+        _overwrite(data.GetNormals(), shape.normals)
+        _overwrite(data.GetArray(HEIGHT), _PER_METRE * shape.height)
         mesh.GetPoints().Modified()
         _place(self.actor, *pose)
         mapper.scalar_visibility = limit is not None
@@ -195,12 +197,20 @@ class SkinActor:
 def geom_mesh(model: mujoco.MjModel, geom: GeomId) -> pv.PolyData | None:
     """Surface of a geom in its frame [m], with normals; None for types that cannot be drawn."""
     visual = geom_visual(model, geom)
-    if (found := shape_of(model, visual)) is None:
+    named_shape = shape_of(model, visual)
+    if named_shape is None:
         return None
-    shape = found[1](_GEOM_SEGMENTS)
+    _, make_shape = named_shape
+    shape = make_shape(_GEOM_SEGMENTS)
     mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, visual)), shape.faces)
     mesh.point_data.active_normals = shape.normals
     return mesh
+
+
+def _overwrite(array: Any, values: NDArray) -> None:
+    """Write new values into an array of VTK."""
+    pv.convert_array(array)[:] = values
+    array.Modified()
 
 
 def _place(actor: pv.Actor, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:

@@ -116,7 +116,8 @@ def _spare_full_disks() -> None:
     that cannot be made makes Mesa complain on standard error.
     """
     names = ("MESA_SHADER_CACHE_DIR", "MESA_GLSL_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
-    folder = Path(next((os.environ[name] for name in names if os.environ.get(name)), "/"))
+    folders = [os.environ[name] for name in names if os.environ.get(name)]
+    folder = Path(folders[0] if folders else "/")
     with contextlib.suppress(OSError):
         existing = next(path for path in (folder, *folder.parents) if path.exists())
         is_full = shutil.disk_usage(existing).free < _SHADER_CACHE_BYTES
@@ -137,7 +138,8 @@ def _draw_without_threads() -> None:
 def _create_on_egl(device: int | None) -> Created:
     """Create a context on an EGL device, and leave it current."""
     place = f"EGL device {device}"
-    if device is None and (device := _device_of_environment()) is not None:
+    if device is None:
+        device = _device_of_environment()
         place = f"EGL device {device}, which {_MUJOCO_DEVICE} names"
     if device is not None and device < 0:
         raise GLError(f"there is no {place}; devices are counted from 0")

@@ -88,8 +88,12 @@ class EGLCurrent(NamedTuple):
         context = egl.eglGetCurrentContext()
         if not context:
             return None
-        draw, read = (egl.eglGetCurrentSurface(which) or 0 for which in (_EGL_DRAW, _EGL_READ))
-        return cls(egl.eglGetCurrentDisplay(), draw, read, context)
+        return cls(
+            display=egl.eglGetCurrentDisplay(),
+            draw=egl.eglGetCurrentSurface(_EGL_DRAW) or 0,
+            read=egl.eglGetCurrentSurface(_EGL_READ) or 0,
+            context=context,
+        )
 
     def make_current(self) -> bool:
         """Make the context current in this thread; return whether it is."""
@@ -116,7 +120,10 @@ class GLXCurrent(NamedTuple):
     def of_thread(cls) -> GLXCurrent | None:
         """The context that is current in this thread, or None."""
         glx = _load_glx()
-        if glx is None or not (context := glx.glXGetCurrentContext()):
+        if glx is None:
+            return None
+        context = glx.glXGetCurrentContext()
+        if not context:
             return None
         return cls(
             display=glx.glXGetCurrentDisplay(),
@@ -235,8 +242,10 @@ def _load_glx() -> ctypes.CDLL | None:
     """The library of GLX, which moderngl loads, too; None if there is none."""
     try:
         glx = ctypes.CDLL(_GLX_LIBRARY)
-        glx.glXGetCurrentContext.restype = glx.glXGetCurrentDisplay.restype = _pointer
-        glx.glXGetCurrentDrawable.restype = glx.glXGetCurrentReadDrawable.restype = ctypes.c_ulong
+        glx.glXGetCurrentContext.restype = _pointer
+        glx.glXGetCurrentDisplay.restype = _pointer
+        glx.glXGetCurrentDrawable.restype = ctypes.c_ulong
+        glx.glXGetCurrentReadDrawable.restype = ctypes.c_ulong
         glx.glXMakeContextCurrent.argtypes = [_pointer, ctypes.c_ulong, ctypes.c_ulong, _pointer]
     except (OSError, AttributeError):
         return None
@@ -282,9 +291,15 @@ def _leave_osmesa() -> Restore | None:
     Python programs have these from PyOpenGL.
     """
     osmesa = _load_osmesa() if "OpenGL.osmesa" in sys.modules else None
-    if osmesa is None or not (context := osmesa.OSMesaGetCurrentContext()):
+    if osmesa is None:
         return None
-    width, height, layout, kind = (ctypes.c_int() for _ in range(4))
+    context = osmesa.OSMesaGetCurrentContext()
+    if not context:
+        return None
+    width = ctypes.c_int()
+    height = ctypes.c_int()
+    layout = ctypes.c_int()
+    kind = ctypes.c_int()
     picture = _pointer()
     osmesa.OSMesaGetColorBuffer(context, *map(ctypes.byref, (width, height, layout, picture)))
     osmesa.OSMesaGetIntegerv(_OSMESA_TYPE, ctypes.byref(kind))

@@ -47,33 +47,38 @@ class Corners:
     ----------
     F : int64 [triangle_count, 3]
         Vertices after merging: equal positions are one vertex.
-    given : int64 [triangle_count, 3]
+    user_vertex : int64 [triangle_count, 3]
         Vertices in the user's arrays; -1 at vertices that cleaning added. Where surfaces touch,
         they show which triangles were joined.
     data : float64 [triangle_count, 3, k]
-        What else the corners carry, linear in each triangle, such as texture coordinates.
+        Other values at the corners, linear in each triangle, such as texture coordinates.
     source : int64 [triangle_count]
-        Triangle of the user's that each was, or was cut from.
+        The user's triangle that each triangle was, or was cut from.
     """
 
     F: NDArray[np.int64]
-    given: NDArray[np.int64]
+    user_vertex: NDArray[np.int64]
     data: NDArray[np.float64]
     source: NDArray[np.int64]
 
     def subset(self, chosen: NDArray) -> Corners:
         """Some of the triangles, chosen by a mask or by number."""
-        return Corners(self.F[chosen], self.given[chosen], self.data[chosen], self.source[chosen])
+        return Corners(
+            F=self.F[chosen],
+            user_vertex=self.user_vertex[chosen],
+            data=self.data[chosen],
+            source=self.source[chosen],
+        )
 
     def reversed(self, chosen: NDArray[np.bool_]) -> Corners:
         """All triangles, the chosen ones wound the other way."""
         F = np.where(chosen[:, None], self.F[:, ::-1], self.F)
-        given = np.where(chosen[:, None], self.given[:, ::-1], self.given)
+        user_vertex = np.where(chosen[:, None], self.user_vertex[:, ::-1], self.user_vertex)
         data = np.where(chosen[:, None, None], self.data[:, ::-1], self.data)
-        return Corners(F, given, data, self.source)
+        return Corners(F, user_vertex, data, self.source)
 
     def split(
-        self, point: NDArray[np.int64], given: NDArray[np.int64], share: NDArray[np.float64]
+        self, point: NDArray[np.int64], user_vertex: NDArray[np.int64], share: NDArray[np.float64]
     ) -> Corners:
         """Insert vertices into sides, and cut the triangles there.
 
@@ -81,16 +86,16 @@ class Corners:
 
         Parameters
         ----------
-        point, given : [triangle_count, 3]
+        point, user_vertex : [triangle_count, 3]
             Vertex to insert into each side, and its number in the user's arrays; -1 for no vertex.
         share : [triangle_count, 3]
             Place of the vertex, from 0 at the side's first corner to 1 at the second.
         """
-        sets = (point >= 0) @ [1, 2, 4]
+        cut_sides = (point >= 0) @ [1, 2, 4]
         parents = []
         patterns = []
-        for number, pattern in {0: [[0, 1, 2]], **SPLITS}.items():
-            chosen = np.flatnonzero(sets == number)
+        for sides, pattern in {0: [[0, 1, 2]], **SPLITS}.items():
+            chosen = np.flatnonzero(cut_sides == sides)
             parents.append(np.repeat(chosen, len(pattern)))
             patterns.append(np.tile(pattern, (len(chosen), 1)))
         # for each piece the triangle that it was cut from, and its corners, numbered as in `SPLITS`
@@ -98,12 +103,13 @@ class Corners:
         parent = np.concatenate(parents)[order]
         corner = np.concatenate(patterns)[order]
         F = np.hstack([self.F, point])
-        numbers = np.hstack([self.given, given])
-        along = self.data + share[..., None] * (np.roll(self.data, -1, axis=1) - self.data)
-        data = np.concatenate([self.data, along], axis=1)
+        user_vertices = np.hstack([self.user_vertex, user_vertex])
+        change_along_side = np.roll(self.data, -1, axis=1) - self.data
+        data_on_sides = self.data + share[..., None] * change_along_side
+        data = np.concatenate([self.data, data_on_sides], axis=1)
         return Corners(
             F[parent[:, None], corner],
-            numbers[parent[:, None], corner],
+            user_vertices[parent[:, None], corner],
             data[parent[:, None], corner],
             self.source[parent],
         )
@@ -241,20 +247,19 @@ def _without_longest_slivers(
     # the sliver's middle corner, opposite to its longest side, goes into that side
     middle = (longest_side[beyond] + 2) % 3
     point = np.where(beyond >= 0, F[beyond, middle], -1)
-    given = np.where(beyond >= 0, corners.given[beyond, middle], -1)
+    user_vertex = np.where(beyond >= 0, corners.user_vertex[beyond, middle], -1)
     share = np.linalg.norm(V[point] - V[F], axis=-1) / np.maximum(length, np.finfo(float).tiny)
-    rest = ~removed
-    split = corners.subset(rest).split(point[rest], given[rest], share[rest])
+    stays = ~removed
+    split = corners.subset(stays).split(point[stays], user_vertex[stays], share[stays])
     return split.subset(distinct_triangles(split.F))
 
 
 def oriented(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, list[str]]:
     """Wind the triangles of each part of a manifold, orientable surface alike.
 
-    Notes say which parts and triangles were turned.
-
-    A closed part faces outwards afterwards, wherever it lies. An open part, and a closed one
-    without volume, faces as most of its triangles did.
+    Returns notes of the parts and triangles that were turned, too. A closed part faces outwards
+    afterwards, wherever it lies. An open part, and a closed one without volume, faces as most of
+    its triangles did.
     """
     F = corners.F
     pairs, rim = sides_of(F)
@@ -292,7 +297,8 @@ def part_volumes(
     count = int(part.max()) + 1
     size = np.bincount(part)
     corners = V[F]
-    middle = np.stack([np.bincount(part, weights=x) / size for x in corners.mean(axis=1).T], axis=1)
+    coordinates = corners.mean(axis=1).T
+    middle = np.stack([np.bincount(part, weights=x) / size for x in coordinates], axis=1)
     # seen from the middle of its part, a far part loses no digits
     a, b, c = np.moveaxis(corners - middle[part][:, None], 1, 0)
     six_volumes = np.einsum("ij,ij->i", a, np.cross(b, c))

@@ -63,44 +63,66 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
     the direction whose largest angle to a triangle's normal is least (Aubry and Loehner 2008), if
     it is better.
     """
-    normal = triangle_normals(V, F)
+    triangle_normal = triangle_normals(V, F)
+    normal = _angle_weighted(V, F, triangle_normal)
+    vertex = F.ravel()
+    triangle = np.repeat(np.arange(len(F)), 3)
+    worst_cosine = _worst_cosines(normal, vertex, triangle_normal[triangle])
+    steep = np.flatnonzero(worst_cosine < _MIN_NORMAL_COSINE)
+    if not len(steep):
+        return normal
+    is_steep = np.isin(vertex, steep)
+    steep_vertex = np.searchsorted(steep, vertex[is_steep])
+    normals_beside = triangle_normal[triangle[is_steep]]
+    middle = _cap_middles(normal[steep], steep_vertex, normals_beside)
+    worst_of_middle = _worst_cosines(middle, steep_vertex, normals_beside)
+    better = worst_of_middle > worst_cosine[steep]
+    normal[steep[better]] = middle[better]
+    return normal
+
+
+def _angle_weighted(
+    V: NDArray[np.float64], F: NDArray[np.int64], triangle_normal: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Mean of the normals [m, 3] of the triangles at each vertex, by their angles there, [n, 3].
+
+    Up, where the normals cancel each other.
+    """
     total = np.zeros_like(V)
     for k, angle in enumerate(corner_angles(V, F).T):
         for axis in range(3):
-            total[:, axis] += np.bincount(
-                F[:, k], weights=angle * normal[:, axis], minlength=len(V)
-            )
-    mean = np.where(
-        np.linalg.norm(total, axis=1, keepdims=True) > 0, normalized(total), [0.0, 0.0, 1.0]
-    )
-    vertex = F.ravel()
-    triangle = np.repeat(np.arange(len(F)), 3)
-    worst_cosine = _worst(mean, vertex, normal[triangle])
-    steep = np.flatnonzero(worst_cosine < _MIN_NORMAL_COSINE)
-    if not len(steep):
-        return mean
-    chosen = np.isin(vertex, steep)
-    vertex = np.searchsorted(steep, vertex[chosen])
-    beside = normal[triangle[chosen]]
-    # middles of the smallest caps that hold the normals at each of these vertices (Badoiu and
-    # Clarkson 2003)
-    middle = mean[steep]
-    for i in range(1, _NORMAL_STEPS):
-        order = np.lexsort((np.einsum("ij,ij->i", middle[vertex], beside), vertex))
-        farthest = order[np.searchsorted(vertex[order], np.arange(len(middle)))]
-        middle += (beside[farthest] - middle) / (i + 1)
-    middle = normalized(middle)
-    better = _worst(middle, vertex, beside) > _worst(mean[steep], vertex, beside)
-    mean[steep[better]] = middle[better]
-    return mean
+            weights = angle * triangle_normal[:, axis]
+            total[:, axis] += np.bincount(F[:, k], weights=weights, minlength=len(V))
+    has_mean = np.linalg.norm(total, axis=1, keepdims=True) > 0
+    return np.where(has_mean, normalized(total), [0.0, 0.0, 1.0])
 
 
-def _worst(
-    normal: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]
+def _cap_middles(
+    start: NDArray[np.float64], vertex: NDArray[np.int64], normals: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Least cosine between the normal of each vertex [k, 3] and the normals of its triangles."""
+    """Middles [k, 3] of the smallest caps of the sphere that hold the normals at each vertex.
+
+    The search begins at `start` [k, 3] (Badoiu and Clarkson 2003). `normals` [j, 3] are those of
+    the triangles at the vertices [j].
+    """
+    middle = start.copy()
+    for i in range(1, _NORMAL_STEPS):
+        cosine = np.einsum("ij,ij->i", middle[vertex], normals)
+        order = np.lexsort((cosine, vertex))
+        farthest = order[np.searchsorted(vertex[order], np.arange(len(middle)))]
+        middle += (normals[farthest] - middle) / (i + 1)
+    return normalized(middle)
+
+
+def _worst_cosines(
+    normal: NDArray[np.float64], vertex: NDArray[np.int64], normals: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Least cosine between the normal of each vertex [k, 3] and the normals of its triangles.
+
+    `normals` [j, 3] are those of the triangles at the vertices [j].
+    """
     worst = np.full(len(normal), np.inf)
-    np.minimum.at(worst, vertex, np.einsum("ij,ij->i", normal[vertex], beside))
+    np.minimum.at(worst, vertex, np.einsum("ij,ij->i", normal[vertex], normals))
     return worst
 
 
@@ -241,20 +263,21 @@ class Mesh:
 
         An open part has the handles that it would have with lids on its holes.
         """
-        # the part of each vertex
-        count = self.component_count
-        part_of = np.full(self.F.max() + 1, -1)
-        part_of[self.F] = self.components[:, None]
-        vertices = np.bincount(part_of[part_of >= 0], minlength=count)
+        part_count = self.component_count
+        part_of_vertex = np.full(self.F.max() + 1, -1)
+        part_of_vertex[self.F] = self.components[:, None]
+        vertices = np.bincount(part_of_vertex[part_of_vertex >= 0], minlength=part_count)
         triangles = np.bincount(self.components)
-        # every triangle has three sides; each inner edge has two of them, each edge of a rim one
-        on_rims, loops = np.zeros((2, count), dtype=np.int64)
+        rim_edges = np.zeros(part_count, dtype=np.int64)
+        rims = np.zeros(part_count, dtype=np.int64)
         for rim in self.rims:
-            on_rims[part_of[rim[0]]] += len(rim)
-            loops[part_of[rim[0]]] += 1
-        edges = (3 * triangles + on_rims) // 2
+            part = part_of_vertex[rim[0]]
+            rim_edges[part] += len(rim)
+            rims[part] += 1
+        # every triangle has three sides; each inner edge has two of them, each edge of a rim one
+        edges = (3 * triangles + rim_edges) // 2
         # Euler's formula is V - E + F = 2 - 2 genus - rims
-        return (2 - (vertices - edges + triangles) - loops) // 2
+        return (2 - (vertices - edges + triangles) - rims) // 2
 
     @functools.cached_property
     def triangle_areas(self) -> NDArray[np.float64]:
@@ -281,9 +304,9 @@ class Mesh:
 
 def _side_by_side(count: int, *data: NDArray[np.float64] | None) -> NDArray[np.float64]:
     """Data of the corners of triangles, [count, 3, k each], as one array; None is left out."""
-    return np.concatenate(
-        [np.empty((count, 3, 0)), *(each for each in data if each is not None)], 2
-    )
+    columns = [np.empty((count, 3, 0))]
+    columns += [values for values in data if values is not None]
+    return np.concatenate(columns, axis=2)
 
 
 def _checked(
@@ -340,26 +363,24 @@ def _cleaned(
 ) -> tuple[NDArray[np.float64], Corners, tuple[str, ...]]:
     """Make a triangle soup a manifold, oriented surface of triangles that have an area.
 
-    The notes say what was done, one line each.
-
-    A surface that needs nothing stays unchanged.
+    Returns vertices, corners and notes of what was done, one line each. A surface that needs
+    nothing stays unchanged.
     """
     unused = len(V) - len(distinct(F))
     notes = [f"{counted(unused, 'unreferenced vertex')} dropped"] if unused else []
     merged, joined = merged_vertices(V, F)
     empty = collapsed(merged)
     keep = distinct_triangles(merged)
-    corners, slivers = without_slivers(V, Corners(merged, F, data, np.arange(len(F))).subset(keep))
+    all_corners = Corners(F=merged, user_vertex=F, data=data, source=np.arange(len(F)))
+    corners, slivers = without_slivers(V, all_corners.subset(keep))
     if len(corners.F) == 0:
         raise MeshError(
             f"{name} has no triangle with an area: none has three different corners that lie on no "
             f"line"
         )
-    first_given = distinct(corners.F)
-    compact = np.searchsorted(first_given, corners.F)
-    points, corners, cuts = cut_apart(
-        V[first_given], dataclasses.replace(corners, F=compact), first_given
-    )
+    used_vertices = distinct(corners.F)
+    corners = dataclasses.replace(corners, F=np.searchsorted(used_vertices, corners.F))
+    points, corners, cuts = cut_apart(V[used_vertices], corners, used_vertices)
     merges, splits = _merges_and_splits(corners)
     turned, turns = oriented(points, corners)
     repeated = ~keep & ~empty
@@ -383,13 +404,13 @@ def _cleaned(
 def _merges_and_splits(corners: Corners) -> tuple[int, int]:
     """How many vertices went by merging with others, and how many were added by cutting."""
     vertex_count = corners.F.max() + 1
-    given = corners.given.ravel()
-    from_user = given >= 0
+    from_user = corners.user_vertex.ravel() >= 0
+    user_vertex = corners.user_vertex.ravel()[from_user]
     # pairs of a vertex in the user's arrays and a vertex of the result
-    pairs = distinct(given[from_user] * vertex_count + corners.F.ravel()[from_user])
+    pairs = distinct(user_vertex * vertex_count + corners.F.ravel()[from_user])
     results = len(distinct(pairs % vertex_count))
     merges = len(pairs) - results
-    splits = len(pairs) - len(distinct(given[from_user])) + int(vertex_count) - results
+    splits = len(pairs) - len(distinct(user_vertex)) + int(vertex_count) - results
     return merges, splits
 
 

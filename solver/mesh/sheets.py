@@ -20,7 +20,7 @@ _MAX_SIDES_ALL_PAIRED = 12
 
 # Cost of joining two sides that do not share their vertices in the user's arrays, in units of the
 # mesh's size: the last choice when windings are made to agree.
-_COST_NOT_GIVEN = 1e6
+_COST_OF_OTHER_VERTICES = 1e6
 
 # Place of a vertex that is put into an edge, from 0 at the edge's lower vertex to 1 at the other.
 # Not the middle, where another vertex may lie already.
@@ -64,19 +64,21 @@ def matched(
     first, second = _candidates(edge[sides])
     first = order[first]
     second = order[second]
-    one = sides[first]
-    two = sides[second]
-    windings_differ = forward[one] == forward[two]
-    sheets_differ = sheet[one // 3] != sheet[two // 3]
+    first_side = sides[first]
+    second_side = sides[second]
+    windings_differ = forward[first_side] == forward[second_side]
+    sheets_differ = sheet[first_side // 3] != sheet[second_side // 3]
     # the inside is towards smaller angles at a side that runs forward, else towards larger ones
-    turn = np.where(forward[one], angle[first] - angle[second], angle[second] - angle[first])
+    difference = angle[first] - angle[second]
+    turn = np.where(forward[first_side], difference, -difference)
     inner_angle = turn % (2 * np.pi)
     # 0 where the surface continues straight, 1 where one triangle lies on the other
     bend = np.abs(np.pi - inner_angle) / np.pi
     # of two equal bends the convex one is better: bodies that touch along an edge stay two
     cost = bend + _CONVEX_WEIGHT * inner_angle + sheets_differ + 2.0 * windings_differ
     best = np.argsort(cost, kind="stable")
-    return _greedy_pairs(np.stack([one, two], axis=1)[best], windings_differ[best], sheet)
+    pairs = np.stack([first_side, second_side], axis=1)
+    return _greedy_pairs(pairs[best], windings_differ[best], sheet)
 
 
 def _angles(
@@ -123,8 +125,8 @@ def _candidates(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.i
 
 def _runs(ordered: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Where each run of equal numbers in a sorted list begins, and how long it is."""
-    first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
-    return first, np.diff(np.append(first, len(ordered)))
+    begins = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
+    return begins, np.diff(np.append(begins, len(ordered)))
 
 
 class _OrientedSheets:
@@ -135,16 +137,19 @@ class _OrientedSheets:
         self._turned = [False] * count  # wound against the parent
         self._size = [1] * count
 
-    def join(self, one: int, two: int, windings_differ: bool) -> bool:
+    def join(self, first: int, second: int, windings_differ: bool) -> bool:
         """Join two sheets; False if that would make the surface one-sided."""
-        root_of_one, turned_one = self._root(one)
-        root_of_two, turned_two = self._root(two)
-        turn = windings_differ ^ turned_one ^ turned_two
-        if root_of_one == root_of_two:
+        first_root, first_turned = self._root(first)
+        second_root, second_turned = self._root(second)
+        turn = windings_differ ^ first_turned ^ second_turned
+        if first_root == second_root:
             return not turn
-        small, large = root_of_two, root_of_one
-        if self._size[root_of_one] < self._size[root_of_two]:
-            small, large = root_of_one, root_of_two
+        if self._size[first_root] < self._size[second_root]:
+            small = first_root
+            large = second_root
+        else:
+            small = second_root
+            large = first_root
         self._parent[small] = large
         self._turned[small] = turn
         self._size[large] += self._size[small]
@@ -164,16 +169,16 @@ def _greedy_pairs(
 ) -> NDArray[np.int64]:
     """Pairs of sides, taken in order, whose sides are free and whose sheets can still be joined."""
     sheets = _OrientedSheets(int(sheet.max()) + 1)
-    taken: set[int] = set()
+    paired_sides: set[int] = set()
     chosen = []
     sheet_pairs = sheet[pairs // 3].tolist()
-    for (first, second), (one, two), differ in zip(
+    for (first, second), (first_sheet, second_sheet), differ in zip(
         pairs.tolist(), sheet_pairs, windings_differ.tolist(), strict=True
     ):
-        if first in taken or second in taken:
+        if first in paired_sides or second in paired_sides:
             continue
-        if sheets.join(one, two, differ):
-            taken |= {first, second}
+        if sheets.join(first_sheet, second_sheet, differ):
+            paired_sides |= {first, second}
             chosen.append((first, second))
     return np.array(chosen, dtype=np.int64).reshape(-1, 2)
 
@@ -204,22 +209,22 @@ def join_sides(
     crowded_sides = order[np.repeat(size > 2, size)]
     # pairs that belong together without a choice
     alone = order[first[size == 2][:, None] + [0, 1]]
-    given_edge = undirected(corners.given)[0]
-    by_given = crowded_sides[np.argsort(given_edge[crowded_sides], kind="stable")]
-    begins, length = _runs(given_edge[by_given])
-    given_together = by_given[begins[length == 2][:, None] + [0, 1]]
-    sure = np.vstack([alone, given_together])
+    user_edge = undirected(corners.user_vertex)[0]
+    user_pairs = _alone_on_edge(crowded_sides, user_edge)
+    sure = np.vstack([alone, user_pairs])
     # the cost of joining each of them: when windings cannot all agree, expensive pairs stay apart
-    not_given = np.where(given_edge[alone[:, 0]] == given_edge[alone[:, 1]], 0.0, _COST_NOT_GIVEN)
-    cost = np.append(not_given, np.zeros(len(given_together)))
+    has_user_edge = user_edge[alone[:, 0]] == user_edge[alone[:, 1]]
+    cost_of_vertices = np.append(
+        np.where(has_user_edge, 0.0, _COST_OF_OTHER_VERTICES), np.zeros(len(user_pairs))
+    )
     middle = V[corners.F].mean(axis=1)
     distance = np.linalg.norm(np.diff(middle[sure // 3], axis=1)[:, 0], axis=1)
-    cost = cost + distance / np.ptp(V, axis=0).max()
+    cost = cost_of_vertices + distance / np.ptp(V, axis=0).max()
     against = forward[sure[:, 0]] == forward[sure[:, 1]]
     triangle_count = len(corners.F)
     flip = turned(sure // 3, against, triangle_count, cost)
-    apart = against ^ flip[sure[:, 0] // 3] ^ flip[sure[:, 1] // 3]
-    pairs = sure[~apart]
+    stays_apart = against ^ flip[sure[:, 0] // 3] ^ flip[sure[:, 1] // 3]
+    pairs = sure[~stays_apart]
     if len(crowded_sides):
         free = np.ones(3 * triangle_count, dtype=bool)
         free[pairs] = False
@@ -229,18 +234,28 @@ def join_sides(
         flip ^= mostly_flipped[sheet]
         free_sides = crowded_sides[free[crowded_sides]]
         pairs = np.vstack([pairs, matched(V, corners.F, free_sides, sheet, flip)])
-    return pairs, order[first[size > 2]], sure[apart][:, 0]
+    return pairs, order[first[size > 2]], sure[stays_apart][:, 0]
+
+
+def _alone_on_edge(sides: NDArray[np.int64], edge: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Pairs [k, 2] of the sides [j] that are alone with each other on an edge.
+
+    `edge` [3 triangle_count] is the number of the edge of every side.
+    """
+    by_edge = sides[np.argsort(edge[sides], kind="stable")]
+    begins, length = _runs(edge[by_edge])
+    return by_edge[begins[length == 2][:, None] + [0, 1]]
 
 
 def cut_apart(
-    V: NDArray[np.float64], corners: Corners, first_given: NDArray[np.int64]
+    V: NDArray[np.float64], corners: Corners, first_user_vertex: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], Corners, list[str]]:
     """Give every sheet vertices of its own where surfaces touch along an edge or at a vertex.
 
     Parameters
     ----------
     V : [vertex_count, 3]
-    first_given : [vertex_count]
+    first_user_vertex : [vertex_count]
         Lowest number of each vertex in the user's arrays.
 
     Returns
@@ -258,10 +273,11 @@ def cut_apart(
     fan = _fans(corners.F, pairs)
     vertex = np.empty(fan.max() + 1, dtype=np.int64)
     vertex[fan] = start
-    uncut = np.bincount(vertex, minlength=len(V))[vertex] == 1
-    lowest_given = np.full(len(vertex), corners.given.max() + 1)
-    np.minimum.at(lowest_given, fan, corners.given.ravel())
-    order = np.argsort(np.where(uncut, first_given[vertex], lowest_given), kind="stable")
+    is_uncut = np.bincount(vertex, minlength=len(V))[vertex] == 1
+    lowest_in_fan = np.full(len(vertex), corners.user_vertex.max() + 1)
+    np.minimum.at(lowest_in_fan, fan, corners.user_vertex.ravel())
+    user_vertex = np.where(is_uncut, first_user_vertex[vertex], lowest_in_fan)
+    order = np.argsort(user_vertex, kind="stable")
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     cut = dataclasses.replace(corners, F=rank[fan].reshape(-1, 3))
@@ -275,8 +291,9 @@ def cut_apart(
         notes.append(
             f"cut open along {counted(len(one_sided), 'edge')}: one-sided, like a Moebius band"
         )
-    touched = np.append(crowded, one_sided)
-    pinched = np.setdiff1d(vertex[~uncut], np.append(start[touched], end[touched]))
+    cut_sides = np.append(crowded, one_sided)
+    on_cut_edges = np.append(start[cut_sides], end[cut_sides])
+    pinched = np.setdiff1d(vertex[~is_uncut], on_cut_edges)
     if len(pinched):
         notes.append(
             f"cut apart at {counted(len(pinched), 'vertex')} where the surface touched itself"
@@ -291,12 +308,12 @@ def _fans(F: NDArray[np.int64], pairs: NDArray[np.int64]) -> NDArray[np.int64]:
     """
     start = F.ravel()
     next_corner = np.roll(np.arange(len(start)).reshape(-1, 3), -1, axis=1).ravel()
-    (one, two) = pairs.T
-    (one_end, two_end) = next_corner[pairs.T]
-    same_way = start[one] == start[two]
-    meets_one = np.where(same_way, two, two_end)
-    meets_one_end = np.where(same_way, two_end, two)
-    links = np.hstack([(one, meets_one), (one_end, meets_one_end)]).T
+    first, second = pairs.T
+    first_end, second_end = next_corner[pairs.T]
+    same_way = start[first] == start[second]
+    meets_first = np.where(same_way, second, second_end)
+    meets_first_end = np.where(same_way, second_end, second)
+    links = np.hstack([(first, meets_first), (first_end, meets_first_end)]).T
     return labels(links, len(start))
 
 
@@ -318,9 +335,10 @@ def _without_double_edges(
     if len(doubled) == 0:
         return V, corners
     leaders, number = np.unique(leader[doubled], return_inverse=True)
-    point, given = np.full((2, *F.shape), -1)
+    point = np.full(F.shape, -1)
+    user_vertex = np.full(F.shape, -1)
     point.flat[doubled] = len(V) + number
     low, high = np.divmod(key[leaders], F.max() + 1)
     between = (1 - _SPLIT_PLACE) * V[low] + _SPLIT_PLACE * V[high]
     share = np.where(forward, _SPLIT_PLACE, 1 - _SPLIT_PLACE).reshape(F.shape)
-    return np.vstack([V, between]), corners.split(point, given, share)
+    return np.vstack([V, between]), corners.split(point, user_vertex, share)

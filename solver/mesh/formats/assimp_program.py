@@ -80,7 +80,9 @@ def _material(material: dict[str, Any]) -> dict[str, Any]:
     """Colour, opacity and image of a material of assimp."""
     color = material.get("COLOR_DIFFUSE", (1.0, 1.0, 1.0))
     textures = material.get("TEXTURES", {})
-    images = [name for number in _IMAGES for name in textures.get(number, ())]
+    images: list[str] = []
+    for number in _IMAGES:
+        images += textures.get(number, ())
     return {
         "color": [float(value) for value in color[:3]],
         "opacity": float(material.get("OPACITY", 1.0)),

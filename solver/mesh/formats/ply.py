@@ -206,9 +206,9 @@ def read_ply(path: Path) -> Soup:
     uv = _corner_uv(vertex, faces, index, sizes)
     F = index[triangles]
     face = np.repeat(np.arange(len(sizes)), sizes)[triangles[:, 0]]
-    kinds = {
-        element.name: {name: kind for name, kind, _ in element.columns} for element in elements
-    }
+    kinds = {}
+    for element in elements:
+        kinds[element.name] = {name: kind for name, kind, _ in element.columns}
     colors = _corner_colors(vertex, faces, kinds, F, face)
     looks = _looks(path, comments, faces, face, colors)
     return Soup(V, F, None if uv is None else uv[triangles], too_small(sizes), looks)
