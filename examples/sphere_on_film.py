@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from scipy.spatial import Delaunay
 
-from ripple_sim import Material, Ripples
+from ripple_sim import Material, Ripples, Target
 
 # of the sphere [m], [kg], [m/s]
 RADIUS = 2.38e-3
@@ -65,16 +65,14 @@ def fall(resolution: int) -> None:
     """Let the sphere fall, and print what is compared."""
     model = film_model()
     data = mujoco.MjData(model)
-    film = Material(speed=np.sqrt(TENSION / DENSITY), density=DENSITY)
-    ripples = Ripples(
-        model,
-        {"film": film},
+    film = Target(
+        Material(speed=np.sqrt(TENSION / DENSITY), density=DENSITY),
         resolution=resolution,
         rim="fixed",
-        contacts={"film": ["plate"]},
-        two_way=True,
+        contacts=["plate"],
+        limit=False,
     )
-    ripples.allow_any_height("film")
+    ripples = Ripples(model, {"film": film}, two_way=True)
     data.qvel[2] = -SPEED
     heights = []
     forces = []
