@@ -23,7 +23,11 @@ from ripple_sim.coupling.soft import target_pose
 from ripple_sim.encode.replace import MARK, made_here as file_made_here
 from ripple_sim.overlay.color_map import colors
 from ripple_sim.render.tone_mapping import srgb_to_linear
-from ripple_sim.render.visuals.visual import texture_pixels
+from ripple_sim.render.visuals.visual import (
+    texture_has_opacity,
+    texture_is_half_clear,
+    texture_pixels_with_opacity,
+)
 
 from .moving_mesh import Displaced, MovingMesh
 from .source import Source, Writer
@@ -230,9 +234,12 @@ def _paint(
         alphaMode="BLEND" if opacity < 1 else "OPAQUE",
     )
     uv = None
-    if finish.texture >= 0:
+    texture = finish.texture
+    if texture >= 0:
         uv = mesh.visual.uv
-        material.baseColorTexture = Image.fromarray(texture_pixels(model, finish.texture))
+        material.baseColorTexture = Image.fromarray(texture_pixels_with_opacity(model, texture))
+        if opacity == 1 and texture_has_opacity(model, texture):
+            material.alphaMode = "BLEND" if texture_is_half_clear(model, texture) else "MASK"
     mesh.visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
 
 

@@ -201,7 +201,8 @@ class PageContent:
         left_out = targets if floor is None else targets | {floor}
         parts = [target.part for target in self.targets.values()]
         return parts + [
-            solid_part(solid) for solid in solids(self._source.model, left_out, _SEGMENTS)
+            solid_part(self._source.model, solid)
+            for solid in solids(self._source.model, left_out, _SEGMENTS)
         ]
 
     def _meta(self, parts: list[PagePart], data: mujoco.MjData) -> dict[str, Any]:

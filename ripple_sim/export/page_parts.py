@@ -16,17 +16,23 @@ from ripple_sim.render.surfaces.vertices import memory_order
 from ripple_sim.render.visuals.scene_light import lighting_of
 from ripple_sim.render.visuals.studio import SOFT_BOX_LIGHTS
 from ripple_sim.render.visuals.texture_mapping import mapping_of
-from ripple_sim.render.visuals.visual import geom_visual, texture_pixels_with_holes
+from ripple_sim.render.visuals.visual import (
+    geom_visual,
+    texture_is_half_clear,
+    texture_pixels_with_opacity,
+)
 
 from .moving_mesh import MovingMesh
 from .source import Source
-from .visuals import Finish, Solid, mean_color, target_finish
+from .visuals import Finish, Solid, mean_color, target_finish, triangle_opacities
 
 _MAX_IMAGE_SIZE = 1024  # of a texture, along a side [pixels]
 _JPEG_QUALITY = 88
 # Mean error of a JPEG, of 255, above which a texture comes without loss: images with small squares
 # of different colours, such as those of vertices.
 _MAX_JPEG_ERROR = 3.0
+# Opacity from which a triangle casts a shadow.
+_CASTING_OPACITY = 0.5
 
 
 class PagePart(NamedTuple):
@@ -64,7 +70,7 @@ def target_part(source: Source, name: str, mesh: MovingMesh) -> PagePart:
         "quaternion": [1, 0, 0, 0] if soft else model.geom_quat[geom].tolist(),
         "open": not source.ripples[name].atlas.mesh.closed,
     }
-    return _part(meta, finish, mesh.F, [mesh.rest, mesh.directions], uv)
+    return _part(model, meta, finish, mesh.F, [mesh.rest, mesh.directions], uv)
 
 
 def floor_of(model: mujoco.MjModel, geom: GeomId) -> dict[str, Any]:
@@ -116,7 +122,7 @@ def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     }
 
 
-def solid_part(solid: Solid) -> PagePart:
+def solid_part(model: mujoco.MjModel, solid: Solid) -> PagePart:
     """A solid geom."""
     meta = {
         "name": solid.name,
@@ -126,14 +132,26 @@ def solid_part(solid: Solid) -> PagePart:
         "quaternion": solid.quaternion.tolist(),
         "open": False,
     }
-    return _part(meta, solid.finish, solid.F, [solid.points, solid.normals], solid.uv)
+    return _part(model, meta, solid.finish, solid.F, [solid.points, solid.normals], solid.uv)
 
 
 def _part(
-    meta: dict[str, Any], finish: Finish, F: NDArray, fields: list[NDArray], uv: NDArray | None
+    model: mujoco.MjModel,
+    meta: dict[str, Any],
+    finish: Finish,
+    F: NDArray,
+    fields: list[NDArray],
+    uv: NDArray | None,
 ) -> PagePart:
-    """Code points and directions in 16 bits each, triangles, and corners' texture coordinates."""
+    """Code points and directions in 16 bits each, triangles, and corners' texture coordinates.
+
+    The triangles that cast shadows come first.
+    """
     F, vertices, triangles = memory_order(F, fields[0])
+    casts = triangle_opacities(model, finish, len(F), uv)[triangles] >= _CASTING_OPACITY
+    casting_first = np.argsort(~casts, kind="stable")
+    F = F[casting_first]
+    triangles = triangles[casting_first]
     points, directions = (np.asarray(field, np.float64)[vertices] for field in fields)
     low = points.min(axis=0)
     size = max(float(np.ptp(points, axis=0).max()), 1e-9)
@@ -141,29 +159,35 @@ def _part(
     arrays = [place, np.rint(directions * 32767).astype("<i2"), F.astype("<u4")]
     if uv is not None:
         arrays.append(np.asarray(uv, "<f4")[triangles])
-    counts = {"points": len(points), "triangles": len(F), "textured": uv is not None}
+    counts = {
+        "points": len(points),
+        "triangles": len(F),
+        "casting": int(casts.sum()),
+        "textured": uv is not None,
+    }
     return PagePart(
-        {**meta, **look_meta(finish), "low": low.tolist(), "size": size, **counts},
+        {**meta, **look_meta(model, finish), "low": low.tolist(), "size": size, **counts},
         arrays,
         F,
         vertices,
     )
 
 
-def look_meta(finish: Finish) -> dict[str, Any]:
+def look_meta(model: mujoco.MjModel, finish: Finish) -> dict[str, Any]:
     """How a part looks, for its description."""
     names = ("roughness", "metallic", "sheen", "coat", "translucency", "transparency", "emission")
     return {
         "color": finish.color.tolist(),
         "opacity": finish.opacity,
         "texture": finish.texture,
+        "clear": finish.texture >= 0 and texture_is_half_clear(model, finish.texture),
         **{name: float(getattr(finish.look, name)) for name in names},
     }
 
 
 def data_uri(model: mujoco.MjModel, texture: int) -> str:
     """A texture of the model as a picture within the page."""
-    image = Image.fromarray(texture_pixels_with_holes(model, texture))
+    image = Image.fromarray(texture_pixels_with_opacity(model, texture))
     image.thumbnail((_MAX_IMAGE_SIZE, _MAX_IMAGE_SIZE))
     kind = "jpeg"
     content = b"" if image.mode == "RGBA" else _encoded(image, kind)

@@ -98,7 +98,7 @@ class PageTarget:
         if self.part.meta["texture"] < 0 <= finish.texture:  # whose image the page does not have
             mean = mean_color(source.model, TextureMapping(texture=finish.texture))
             finish = finish._replace(color=finish.color * mean, texture=-1)
-        return look_meta(finish)
+        return look_meta(source.model, finish)
 
     def begin(self) -> str:
         """Begin the run with the present state; return the law of its waves, or ""."""

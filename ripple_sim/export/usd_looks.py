@@ -16,7 +16,11 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 from ripple_sim.encode.replace import png_mark
 from ripple_sim.render.visuals.lights import Lighting
 from ripple_sim.render.visuals.scene_light import lighting_of
-from ripple_sim.render.visuals.visual import texture_has_holes, texture_pixels_with_holes
+from ripple_sim.render.visuals.visual import (
+    texture_has_opacity,
+    texture_is_half_clear,
+    texture_pixels_with_opacity,
+)
 
 from .source import Source
 from .visuals import Finish
@@ -219,10 +223,11 @@ class Materials:
         if finish.texture >= 0:
             image = self._image(path, finish.texture, color)
             diffuse.ConnectToSource(image.GetOutput("rgb"))
-            if texture_has_holes(self._model, finish.texture):
+            if texture_has_opacity(self._model, finish.texture):
                 shader.GetInput("opacity").ConnectToSource(image.GetOutput("a"))
-                threshold = shader.CreateInput("opacityThreshold", Sdf.ValueTypeNames.Float)
-                threshold.Set(_HOLE_OPACITY)
+                if not texture_is_half_clear(self._model, finish.texture):
+                    threshold = shader.CreateInput("opacityThreshold", Sdf.ValueTypeNames.Float)
+                    threshold.Set(_HOLE_OPACITY)
         else:
             diffuse.Set(color)
         # what UsdPreviewSurface has no word for; Blender takes such attributes over as custom
@@ -247,7 +252,7 @@ class Materials:
         if texture not in self._textures:  # where it is, from the stage's file
             self._images.mkdir(exist_ok=True)
             name = f"texture_{texture}.png"
-            Image.fromarray(texture_pixels_with_holes(self._model, texture)).save(
+            Image.fromarray(texture_pixels_with_opacity(self._model, texture)).save(
                 self._images / name, pnginfo=png_mark()
             )
             self._textures[texture] = f"./{self._images.name}/{name}"

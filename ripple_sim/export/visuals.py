@@ -22,7 +22,9 @@ from ripple_sim.render.visuals.visual import (
     Visual,
     look_of,
     target_visual,
+    texture_has_opacity,
     texture_pixels,
+    texture_pixels_with_opacity,
     visible_geoms,
 )
 
@@ -126,6 +128,20 @@ def texture_places(
     """
     places = coordinates[..., :2] * mapping.tiling[:2] + mapping.tiling[2:]
     return np.stack([places[..., 0], 1.0 - places[..., 1]], axis=-1)
+
+
+def triangle_opacities(
+    model: mujoco.MjModel, finish: Finish, count: int, uv: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Opacities of `count` triangles in the middle, [m]; their corners' places are [m, 3, 2]."""
+    if uv is None or finish.texture < 0 or not texture_has_opacity(model, finish.texture):
+        return np.full(count, finish.opacity)
+    pixels = texture_pixels_with_opacity(model, finish.texture)
+    height, width, _ = pixels.shape
+    u, v = uv.mean(axis=1).T
+    column = np.floor(u * width).astype(np.int64) % width
+    row = np.floor((1.0 - v) * height).astype(np.int64) % height
+    return np.asarray(finish.opacity * pixels[row, column, 3] / 255)
 
 
 def mean_color(model: mujoco.MjModel, mapping: TextureMapping) -> NDArray[np.float64]:

@@ -102,6 +102,15 @@ class MappingKind(IntEnum):
     CAPSULE_IMAGE = 6
 
 
+class Texels(IntEnum):
+    """Which texels of a target's texture are drawn, by their opacity; the same names in GLSL."""
+
+    ALL_TEXELS = 0  # the texture has no opacity
+    HALF_OPAQUE_TEXELS = 1  # those that are more than half opaque, and then count as opaque
+    OPAQUE_TEXELS = 2
+    CLEAR_TEXELS = 3  # those that show what is behind them, but not fully
+
+
 class CasterMap(IntEnum):
     """Kinds of maps in which a light or the floor sees objects; `NAME_MAP` in GLSL."""
 
@@ -233,6 +242,7 @@ class Shading(IntEnum):
     USUAL = 0
     HEATMAP = 1  # colours are shown as they are, except for shadows
     UNLIT = 2  # colours are shown as they are
+    CLEAR = 3  # each texel has an opacity of its own, which the G-buffer has in place of ink
 
 
 OBJECT = Struct(
@@ -255,6 +265,7 @@ DEFINES: dict[str, object] = {
     **numbered(Unit, "_UNIT"),
     **numbered(Binding, "_BINDING"),
     **numbered(MappingKind),
+    **numbered(Texels),
     **numbered(CasterMap, "_MAP"),
     **numbered(Shading, "_SHADING"),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
@@ -264,6 +275,7 @@ DEFINES: dict[str, object] = {
     },
     # defaults, which passes may override
     "BACKDROP": 1,
+    "TEXELS": int(Texels.ALL_TEXELS),
     "HORIZON": 0,
     "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
     "OBJECT_COLUMNS": OBJECT_COLUMNS,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import moderngl
 import mujoco
@@ -22,7 +22,9 @@ from ripple_sim.solver.errors import RippleError
 from .contract import CasterMap
 from .height_map_textures import AnyHeightMap, HeightMapTextures
 from .pose import Pose
-from .surface_mesh import SurfaceMesh
+from .surface_mesh import ClearTexels, SurfaceMesh
+
+Drawable: TypeAlias = SurfaceMesh | ClearTexels | Instances
 
 
 class DrawnScene:
@@ -38,7 +40,7 @@ class DrawnScene:
     Attributes
     ----------
     targets : list of SurfaceMesh
-    opaque, transparent : list of SurfaceMesh and Instances
+    opaque, transparent : list of SurfaceMesh, ClearTexels and Instances
         Each can draw itself into the G-buffer, and into the maps of the lights and of the floor.
     """
 
@@ -88,10 +90,11 @@ class DrawnScene:
         for target in self.targets:
             if paints is not None and target.geom in paints:
                 target.paint(paints[target.geom])
-        self._assets.objects.keep(len(self.targets))
+        self._assets.objects.keep(sum(len(target.numbers) for target in self.targets))
         self._instances = instances_of(self._assets, visuals, self._made)
         surfaces = [target for target in self.targets if target.geom not in hidden]
-        drawn: list[SurfaceMesh | Instances] = [*surfaces, *self._instances]
+        clear_texels = [target.clear_texels for target in surfaces]
+        drawn: list[Drawable] = [*surfaces, *filter(None, clear_texels), *self._instances]
         self.opaque = [drawable for drawable in drawn if not drawable.transparent]
         self.transparent = [drawable for drawable in drawn if drawable.transparent]
         casters = [drawable for drawable in drawn if drawable.casts]
@@ -163,13 +166,11 @@ class DrawnScene:
         for drawable in self._casters[seen]:
             drawable.cast(seen, **uniforms)
 
-    def layers(
-        self, data: Any, pose: Pose
-    ) -> list[tuple[NDArray[np.float64], SurfaceMesh | Instances]]:
+    def layers(self, data: Any, pose: Pose) -> list[tuple[NDArray[np.float64], Drawable]]:
         """Balls about every transparent object, and the object; the furthest object comes first."""
         layers = [(drawable.bounds(data), drawable) for drawable in self.transparent]
 
-        def distance(layer: tuple[NDArray[np.float64], SurfaceMesh | Instances]) -> float:
+        def distance(layer: tuple[NDArray[np.float64], Drawable]) -> float:
             balls, drawable = layer
             if drawable.is_plane:  # behind everything else, as in MuJoCo
                 return float("inf")

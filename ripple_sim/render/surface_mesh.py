@@ -16,11 +16,12 @@ from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearan
 from ripple_sim.render.surfaces.tessellation import BAKED, DIRECTION, NORMAL, POSITION
 from ripple_sim.render.surfaces.vertices import mapped_coordinates, surface_vertices
 from ripple_sim.render.visuals.objects import Assets, Occluders
-from ripple_sim.render.visuals.visual import Visual, target_visual, texture_has_holes
+from ripple_sim.render.visuals.texture_mapping import TextureMapping
+from ripple_sim.render.visuals.visual import Visual, target_visual, texture_has_opacity
 from ripple_sim.solver.errors import RippleError
 
 from .bounds import balls_about
-from .contract import CasterMap, MappingKind, Shading
+from .contract import CasterMap, MappingKind, Shading, Texels
 from .height_map_textures import AnyHeightMap, HeightMapTextures, MovedHeightMap
 
 # Length of an edge [pixels], where the target fills the frame's height.
@@ -69,7 +70,9 @@ class SurfaceMesh:
     Attributes
     ----------
     numbers : list of int
-        The target's one number in the table of objects.
+        The target's number in the table of objects, and that of its clear texels.
+    clear_texels : ClearTexels or None
+        What is drawn as an object of its own, where the texture is neither opaque nor clear.
     transparent : bool
         Whether the scene behind the target shows through.
     blocks : bool
@@ -113,16 +116,18 @@ class SurfaceMesh:
         self.casts = True
         self.is_plane = False
         has_heatmap = surface.heatmap_colors is not None
-        number = assets.objects.add(
-            look,
-            geom,
-            identity=visual.identity,
-            size=self._radius,
-            shading=Shading.HEATMAP if has_heatmap else Shading.USUAL,
-            height_map=index,
-            chart=page.block,
-        )
-        self.numbers = [number]
+        self.numbers = [
+            assets.objects.add(
+                look,
+                geom,
+                identity=visual.identity,
+                size=self._radius,
+                shading=shading,
+                height_map=index,
+                chart=page.block,
+            )
+            for shading in (Shading.HEATMAP if has_heatmap else Shading.USUAL, Shading.CLEAR)
+        ]
         pixel = 2 * self._radius / size[1]  # [m], where the target fills the frame's height
         max_faces = size[0] * size[1] // _PIXELS_PER_FACE
         vertices = surface_vertices(surface, pixel * _EDGE_LENGTH, max_faces)
@@ -146,80 +151,93 @@ class SurfaceMesh:
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
         colors = surface.heatmap_colors
         self._heatmap = None if colors is None else HeatmapTexture(resources, page, colors)
-        # by the kind of the texture, and whether it has holes
-        self._programs: dict[
-            tuple[MappingKind, bool], tuple[moderngl.Program, moderngl.VertexArray]
-        ] = {}
-        is_lens = not self._is_open and look.transparency > 0.0
-        self._casters = self._make_casters(is_lens)
+        # for the G-buffer, and for the maps
+        self._solids: dict[tuple[MappingKind, Texels], moderngl.VertexArray] = {}
+        self._casters: dict[tuple[CasterMap, Texels], moderngl.VertexArray] = {}
+        self._is_lens = not self._is_open and look.transparency > 0.0
+        # triangles in the maps: depths need no triangles that are split along waves, and colours on
+        # the floor only coarse triangles
+        self._caster_indices = {
+            CasterMap.DEPTH: resources.buffer(vertices.F.astype("i4").tobytes()),
+            CasterMap.ALBEDO: resources.buffer(vertices.coarse.astype("i4").tobytes()),
+            CasterMap.TRANSMISSION: self._indices,
+        }
         self._surface = surface
         self._mapping = mapping
         self.paint(visual)
-
-    def _make_casters(self, is_lens: bool) -> dict[CasterMap, moderngl.VertexArray]:
-        """Make what draws the mesh into each map of a light or of the floor.
-
-        Depths need no triangles that are split along waves, and colours on the floor only coarse
-        triangles.
-        """
-        resources = self._resources
-        moved = (self._displacement.moved, "4f", "in_moved")
-        indices = {
-            CasterMap.DEPTH: resources.buffer(self._vertices.F.astype("i4").tobytes()),
-            CasterMap.ALBEDO: resources.buffer(self._vertices.coarse.astype("i4").tobytes()),
-            CasterMap.TRANSMISSION: self._indices,
-        }
-        casters = {}
-        for kind, triangles in indices.items():
-            program = resources.program("passes/casters", MOVED=1, MAP=kind, SOLID=int(is_lens))
-            casters[kind] = resources.vertex_array(program, [moved], triangles)
-        return casters
 
     def paint(self, visual: Visual) -> None:
         """Take colour, material and texture from the visual of the target's geom."""
         look, rgb, mapping = appearance(self._assets.model, visual, self._surface)
         opacity = visual.opacity or 1.0  # targets that MuJoCo does not show are drawn all the same
-        self._objects.paint(self.numbers[0], look, opacity)
+        for number in self.numbers:
+            self._objects.paint(number, look, opacity)
         self.transparent = look.transparency > 0.0 or opacity < 1.0
         self.blocks = not self.transparent
-        self._color = (*rgb, float(self.numbers[0]))
+        self._rgb = rgb
         # linear colour of the light that passes through the target
-        passing = 1.0 - opacity + opacity * look.transparency * rgb
-        self._casters[CasterMap.ALBEDO].program["color"] = tuple(rgb - passing)
-        self._casters[CasterMap.TRANSMISSION].program["transmission"] = tuple(passing)
+        self._passing = 1.0 - opacity + opacity * look.transparency * rgb
         if mapping.key != self._mapping.key:
             self._displacement.lay(mapped_coordinates(self._vertices.attributes, mapping))
         self._mapping = mapping
         self._image = None if mapping.texture < 0 else self._assets.texture(mapping.texture)
-        holes = mapping.texture >= 0 and texture_has_holes(self._assets.model, mapping.texture)
-        if (mapping.kind, holes) not in self._programs:
-            self._programs[mapping.kind, holes] = self._program_of(mapping.kind, holes)
-        self._program, self._solid = self._programs[mapping.kind, holes]
-        if mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):
-            self._program["tiling"] = mapping.tiling
+        self._texels = self._shown_texels(mapping)
+        self.clear_texels = ClearTexels(self) if self._texels == Texels.OPAQUE_TEXELS else None
 
-    def _program_of(
-        self, kind: MappingKind, holes: bool
-    ) -> tuple[moderngl.Program, moderngl.VertexArray]:
-        """Program and vertex array for the G-buffer, for a kind of texture, perhaps with holes."""
-        resources = self._resources
-        surface = self._surface
+    def _shown_texels(self, mapping: TextureMapping) -> Texels:
+        """Which texels of a texture the target itself shows, beside its clear texels."""
+        texture = mapping.texture
+        is_flat = mapping.kind == MappingKind.FLAT_IMAGE
+        if not is_flat or not texture_has_opacity(self._assets.model, texture):
+            return Texels.ALL_TEXELS
+        explains = self._heatmap is not None or self._surface.grid > 0
+        if self.transparent or explains or not self._assets.is_half_clear(texture):
+            return Texels.HALF_OPAQUE_TEXELS
+        return Texels.OPAQUE_TEXELS
+
+    def _solid(self, texels: Texels) -> moderngl.VertexArray:
+        """Vertex array with the program that draws some texels into the G-buffer."""
+        key = self._mapping.kind, texels
+        if key not in self._solids:
+            surface = self._surface
+            program = self._resources.program(
+                "surfaces/surface",
+                MAPPING=self._mapping.kind,
+                HEATMAP=int(self._heatmap is not None),
+                GRID=int(surface.grid > 0),
+                TEXELS=texels,
+            )
+            program["resolution"] = float(self._page.resolution)
+            if surface.grid:
+                program["grid_spacing"] = float(surface.grid)
+            self._solids[key] = self._vertex_array(program, self._indices)
+        return self._solids[key]
+
+    def _caster(self, seen: CasterMap, texels: Texels) -> moderngl.VertexArray:
+        """Vertex array with the program that draws some texels into maps of a kind."""
+        if (seen, texels) not in self._casters:
+            program = self._resources.program(
+                "passes/casters",
+                MOVED=1,
+                MAP=seen,
+                SOLID=int(self._is_lens),
+                MAPPING=MappingKind.FLAT_IMAGE,
+                TEXELS=texels,
+            )
+            triangles = self._caster_indices[seen]
+            self._casters[seen, texels] = self._vertex_array(program, triangles)
+        return self._casters[seen, texels]
+
+    def _vertex_array(
+        self, program: moderngl.Program, triangles: moderngl.Buffer
+    ) -> moderngl.VertexArray:
         displacement = self._displacement
-        heatmap = int(self._heatmap is not None)
-        grid = int(surface.grid > 0)
-        program = resources.program(
-            "surfaces/surface", MAPPING=kind, HEATMAP=heatmap, GRID=grid, HOLES=int(holes)
-        )
-        program["resolution"] = float(self._page.resolution)
-        if grid:
-            program["grid_spacing"] = float(surface.grid)
         content = [
             (displacement.moved, "4f", "in_moved"),
             (displacement.vertices, *displacement.KEPT),
         ]
         # drivers remove attributes that a program does not use
-        vertex_array = resources.vertex_array(program, content, self._indices, skip_errors=True)
-        return program, vertex_array
+        return self._resources.vertex_array(program, content, triangles, skip_errors=True)
 
     def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:
         """Read a height map, and choose the triangles for it; `update` displaces the vertices.
@@ -284,7 +302,8 @@ class SurfaceMesh:
         self._pose = rotation, origin
         near_occluders = int(occluders.near(self.ball(), np.array([self.geom]))[0])  # a bit each
         shadow_bias = min(_BIAS_PER_HEIGHT * self._highest, _MAX_BIAS * self._radius)  # [m]
-        self._objects.place(self.numbers[0], shadow_bias, rotation=rotation)
+        for number in self.numbers:
+            self._objects.place(number, shadow_bias, rotation=rotation)
         self._height_maps.bind()
         self._displacement.run(rotation, origin, near_occluders)
 
@@ -336,18 +355,37 @@ class SurfaceMesh:
         return np.column_stack([centres, radii])
 
     def draw(self) -> None:
-        """Draw into the G-buffer."""
+        """Draw into the G-buffer, without the clear texels."""
+        self.draw_texels(self._texels, self.numbers[0])
+
+    def draw_texels(self, texels: Texels, number: int) -> None:
+        """Draw some texels into the G-buffer, as an object of a number."""
+        solid = self._solid(texels)
+        program = solid.program
         if self._image is not None:
             self._image.use(self._mapping.unit)
+        if self._mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):
+            program["tiling"] = self._mapping.tiling
         if self._heatmap is not None:
-            self._heatmap.use(self._program)
-        self._program["rotation"] = tuple(self._pose[0].T.ravel())
-        self._program["color"] = self._color
-        self._render(self._solid, self._count)
+            self._heatmap.use(program)
+        program["rotation"] = tuple(self._pose[0].T.ravel())
+        program["color"] = (*self._rgb, float(number))
+        self._render(solid, self._count)
 
     def cast(self, seen: CasterMap, **uniforms: Any) -> None:
         """Draw into a map of a light or of the floor; see `DrawnScene.cast`."""
-        casters = self._casters[seen]
+        self.cast_texels(self._texels, seen, **uniforms)
+
+    def cast_texels(self, texels: Texels, seen: CasterMap, **uniforms: Any) -> None:
+        """Draw some texels into a map of a light or of the floor."""
+        casters = self._caster(seen, texels)
+        if seen == CasterMap.ALBEDO:
+            uniforms["color"] = tuple(self._rgb - self._passing)
+        elif seen == CasterMap.TRANSMISSION:
+            uniforms["transmission"] = tuple(self._passing)
+        if texels != Texels.ALL_TEXELS and self._image is not None:
+            self._image.use(self._mapping.unit)
+            uniforms["tiling"] = self._mapping.tiling
         for name, value in uniforms.items():
             casters.program[name] = value
         self._render(casters, self._count if seen == CasterMap.TRANSMISSION else -1)
@@ -366,3 +404,40 @@ class SurfaceMesh:
                 triangles.render(vertices=count)
             if self._is_open:
                 ctx.enable(moderngl.CULL_FACE)
+
+
+class ClearTexels:
+    """The texels of a target that are neither opaque nor clear, as a transparent object.
+
+    They are drawn behind everything that is opaque. Where several lie behind each other, the
+    nearest one is seen.
+
+    Attributes
+    ----------
+    numbers : list of int
+        Their number in the table of objects.
+    transparent, blocks, occludes, casts, is_plane : bool
+        As for `SurfaceMesh`.
+    """
+
+    transparent = True
+    blocks = False
+    occludes = False
+    casts = True
+    is_plane = False
+
+    def __init__(self, target: SurfaceMesh) -> None:
+        self._target = target
+        self.numbers = target.numbers[1:]
+
+    def bounds(self, data: Any = None) -> NDArray[np.float64]:
+        """Balls [k, 4] that together contain them."""
+        return self._target.bounds(data)
+
+    def draw(self) -> None:
+        """Draw into the G-buffer."""
+        self._target.draw_texels(Texels.CLEAR_TEXELS, self.numbers[0])
+
+    def cast(self, seen: CasterMap, **uniforms: Any) -> None:
+        """Draw into a map of a light; see `DrawnScene.cast`."""
+        self._target.cast_texels(Texels.CLEAR_TEXELS, seen, **uniforms)

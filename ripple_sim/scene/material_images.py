@@ -13,7 +13,7 @@ from PIL import Image
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.images import read_image
-from ripple_sim.solver.mesh.looks import BLEND, MASK, OPAQUE, ImageSource, Looks, Paint
+from ripple_sim.solver.mesh.looks import ImageSource, Paint
 
 # First bytes of KTX2 files, whose images are compressed for graphics cards.
 _KTX2 = b"\xabKTX 20\xbb"
@@ -102,33 +102,3 @@ class MaterialImages:
         noun = "image" if count == 1 else "images"
         verb = "is" if len(reasons) == 1 else "are"
         return (f"{len(reasons)} of {count} {noun} {verb} not shown: {said}",)
-
-
-def with_holes_or_opaque(looks: Looks, images: MaterialImages) -> tuple[Looks, tuple[str, ...]]:
-    """Looks without half-transparent materials, and one line on them, if there were any.
-
-    A material whose image is opaque in parts and clear in others becomes a mask; others become
-    opaque.
-    """
-    paints = []
-    changed = 0
-    used = set(np.unique(looks.paint).tolist())
-    for number, paint in enumerate(looks.paints):
-        if paint.alpha == BLEND and number in used:
-            image = images.of(paint)
-            # half of the opacity of the whole divides the clear parts from the others
-            holes = image is not None and image[..., 3].min() < 128 <= image[..., 3].max()
-            whole = not holes and paint.color[3] >= 1
-            if whole and looks.colors is not None:
-                whole = bool((looks.colors[looks.paint == number, :, 3] == 1).all())
-            if whole and image is not None:
-                whole = bool(image[..., 3].min() == 255)
-            changed += not whole
-            opaque = (*paint.color[:3], 1.0)
-            paint = dataclasses.replace(
-                paint, alpha=MASK if holes else OPAQUE, color=opaque, cutoff=0.5
-            )
-        paints.append(paint)
-    noun = "material is" if changed == 1 else "materials are"
-    said = (f"{changed} half-transparent {noun} drawn opaque, or with holes",) if changed else ()
-    return dataclasses.replace(looks, paints=tuple(paints)), said

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
-from ripple_sim.solver.mesh.looks import CLAMP, MASK, MIRROR, REPEAT, Looks, Paint
+from ripple_sim.solver.mesh.looks import BLEND, CLAMP, MASK, MIRROR, REPEAT, Looks, Paint
 
 # Longest side of a packed image [pixels]. It is longer where the colours of vertices need more.
 _LONGEST_SIDE = 4096
@@ -408,9 +408,11 @@ def _encoded_by_paint(
 
 
 def _opacity(opacity: NDArray[np.float64], paint: Paint) -> NDArray[np.uint8]:
-    """Opacity as pixels: a mask is whole or not, and other materials are opaque."""
+    """Opacity as pixels: a mask is whole or not, and opaque materials have none."""
     if paint.alpha == MASK:
         return np.where(opacity >= paint.cutoff, 255, 0).astype(np.uint8)
+    if paint.alpha == BLEND:
+        return np.rint(255 * np.clip(opacity, 0.0, 1.0)).astype(np.uint8)
     return np.full(np.shape(opacity), 255, np.uint8)
 
 

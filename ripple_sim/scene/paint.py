@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh, load_mesh
-from ripple_sim.solver.mesh.looks import MASK, ImageSource, Looks, Paint
+from ripple_sim.solver.mesh.looks import OPAQUE, ImageSource, Looks, Paint
 
-from .material_images import MaterialImages, load_image, with_holes_or_opaque
+from .material_images import MaterialImages, load_image
 from .packing import packed
 
 # Geoms that have meshes, and the endings of files that MuJoCo reads and that have materials.
@@ -38,7 +38,7 @@ class Painting:
     Attributes
     ----------
     pixels : uint8 [height, width, 3 or 4]
-        sRGB, and opacity if the surface has holes.
+        sRGB, and opacity if the surface is not opaque everywhere.
     uv : float64 [triangle_count, 3, 2]
         Texture coordinates of the corners; v is counted from the upper edge.
     metallic, roughness : float or None
@@ -131,9 +131,9 @@ def _give(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, painting: Painting, name: s
     )
     image.data = painting.pixels.tobytes()
     material = spec.add_material(name=name)
-    has_holes = channels == 4
+    has_opacity = channels == 4
     role = mujoco.mjtTextureRole
-    material.textures[role.mjTEXROLE_RGBA if has_holes else role.mjTEXROLE_RGB] = name
+    material.textures[role.mjTEXROLE_RGBA if has_opacity else role.mjTEXROLE_RGB] = name
     if painting.metallic is not None:
         material.metallic = painting.metallic
     if painting.roughness is not None:
@@ -154,13 +154,12 @@ def _of_image(mesh: Mesh, mesh_path: str | Path, texture: str | Path) -> Paintin
 def painting_of(mesh: Mesh, looks: Looks) -> Painting:
     """The looks of a mesh, which have materials, packed into one image."""
     images = MaterialImages()
-    looks, transparent = with_holes_or_opaque(looks, images)
     image = packed(looks, mesh.corner_uv, images.of)
-    has_holes = any(paint.alpha == MASK for paint in looks.paints)
-    has_holes = has_holes and bool((image.pixels[..., 3] < 255).any())
-    pixels = image.pixels if has_holes else np.ascontiguousarray(image.pixels[..., :3])
+    has_opacity = any(paint.alpha != OPAQUE for paint in looks.paints)
+    has_opacity = has_opacity and bool((image.pixels[..., 3] < 255).any())
+    pixels = image.pixels if has_opacity else np.ascontiguousarray(image.pixels[..., :3])
     metallic, roughness = _mean_gloss(mesh, looks, images)
-    notes = (*looks.notes, *images.notes(), *transparent)
+    notes = (*looks.notes, *images.notes())
     if image.scale < _NOTED_SCALE:
         notes = (*notes, f"its images are scaled to {image.scale:.0%} to fit into one texture")
     return Painting(pixels, image.uv, metallic, roughness, notes)

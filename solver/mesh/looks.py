@@ -27,6 +27,10 @@ BLEND = "blend"
 MASK_CUTOFF = 0.5
 
 
+# Opacity below which colours are not seen.
+CLEAR = 0.01
+
+
 @dataclasses.dataclass(frozen=True)
 class ImageSource:
     """An image that a file names or holds.
@@ -121,6 +125,16 @@ def with_opacity(colors: NDArray[np.float64]) -> NDArray[np.float64]:
     opaque = np.ones((len(colors), 4))
     opaque[:, : colors.shape[1]] = colors[:, :4]
     return opaque
+
+
+def alpha_of(colors: NDArray[np.float64]) -> str:
+    """How the opacity of corners' colours [..., 4] counts.
+
+    It does not count where all are clear, which some programs write and do not mean.
+    """
+    opacity = colors[..., 3]
+    is_clear = opacity.max(initial=0.0) < CLEAR
+    return BLEND if opacity.min(initial=1.0) < 1 and not is_clear else OPAQUE
 
 
 def unit_range(values: NDArray) -> NDArray[np.float64]:

@@ -175,6 +175,35 @@ def test_masks_have_holes_in_frames(opengl, tmp_path: Path) -> None:
     assert np.quantile(clear, 0.05) > whole.min() + 10
 
 
+def glass_before_blue(folder: Path, opacity: float) -> Path:
+    """A red square with an opacity, before a blue square that is as large."""
+    file = Gltf()
+    primitives = []
+    for color, mode, depth in (((0, 0, 1, 1), "OPAQUE", 0), ((1, 0, 0, opacity), "BLEND", 0.2)):
+        gloss = {"baseColorFactor": color, "metallicFactor": 0, "roughnessFactor": 1}
+        material = file.add("materials", alphaMode=mode, pbrMetallicRoughness=gloss)
+        points = SQUARE + np.float32([0, 0, depth])
+        primitives.append(file.primitive(points, material=material))
+    file.show(*primitives)
+    return file.write(folder / "a.glb")
+
+
+def test_half_transparent_parts_show_what_is_behind_them(opengl, tmp_path: Path) -> None:
+    middles = []
+    for opacity in (0.0, 0.5, 1.0):
+        path = glass_before_blue(tmp_path, opacity)
+        scene = drop_scene(path, bodies=0, up="y", view="front", elevation=0)
+        simulation = Simulation(scene, fps=10, resolution=16, backend="cpu")
+        frame = FrameSource(simulation, width=64, height=48).render(
+            next(iter(snapshots(simulation, 1)))
+        )
+        middles.append(frame[20:28, 28:36].mean(axis=(0, 1)))
+    behind, half, before = middles
+    assert behind[2] > behind[0] + 50 and before[0] > before[2] + 50
+    # the square in front takes light from the one behind
+    np.testing.assert_allclose(half, (behind + before) / 2, atol=20)
+
+
 def test_pages_have_images_of_small_squares_without_loss_and_holes(tmp_path: Path) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (128, 128, 3), np.uint8)
     smooth = np.broadcast_to(np.arange(128, dtype=np.uint8)[:, None, None], (128, 128, 3))
@@ -208,7 +237,7 @@ def painted(mesh: Mesh, texture=None) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     return spec.compile(), notes
 
 
-def test_half_transparent_materials_are_named_and_gloss_is_the_mean(tmp_path: Path) -> None:
+def test_half_transparent_materials_have_opacity_and_gloss_is_the_mean(tmp_path: Path) -> None:
     file = Gltf()
     gloss = file.texture([[[0, 128, 255]]])
     first = file.add(
@@ -222,8 +251,9 @@ def test_half_transparent_materials_are_named_and_gloss_is_the_mean(tmp_path: Pa
     second = file.add("materials", pbrMetallicRoughness={"metallicFactor": 0})
     file.show(file.primitive(material=first), file.primitive(3 * SQUARE + 1, material=second))
     model, notes = painted(load_mesh(file.write(tmp_path / "a.glb")))
-    assert notes == ("1 half-transparent material is drawn opaque, or with holes",)
-    assert model.tex_nchannel[0] == 3
+    assert notes == ()
+    assert model.tex_nchannel[0] == 4
+    assert sorted(set(model.tex_data[3::4].tolist())) == [51, 255]
     assert model.mat_metallic[0] == pytest.approx(0.1)
     assert model.mat_roughness[0] == pytest.approx((128 / 255 + 9) / 10)
 

@@ -2,6 +2,11 @@
 // transparent surfaces, arrows. Where pixels are drawn by software, edges are smoothed afterwards:
 // samples would cost more; with alpha, the canvas is copied for nothing.
 const HEATED = [0.62, 0.62, 0.62]; // what is lit under the colours of heights
+// Least opacity, and opacity up to which texels of a texture are drawn: those that are more than
+// half opaque, where a texture has no others; opaque ones; and those that show what is behind them.
+const HALF_OPAQUE = [0.5, 2];
+const OPAQUE = [0.95, 2];
+const CLEAR = [0.02, 0.95];
 const SHADOW_CELL = 4; // texels of the shadow map between the points of surfaces in it
 
 class Drawing {
@@ -148,7 +153,10 @@ class Drawing {
     this.drawScreen(view, floor);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    for (const each of parts) if (each.opacity < 1) this.drawPart(each);
+    for (const each of parts) {
+      if (each.opacity < 1) this.drawPart(each);
+      else if (this.isClear(each.part)) this.drawClear(each);
+    }
     gl.disable(gl.BLEND);
     for (const model of arrows) this.drawPart({part: this.arrow, model});
     if (this.software) this.smooth();
@@ -226,20 +234,36 @@ class Drawing {
     this.floor.drawCells(1);
   }
 
-  drawPart({part, model}) {
+  // Whether a part is drawn with an image that has texels which are neither opaque nor clear.
+  isClear(part) {
+    return part.clear && part.opacity === 1 && this.imageOf(part) && !(this.heated && part.target);
+  }
+
+  // The nearest of a part's texels that are neither opaque nor clear: depths first, then colours.
+  drawClear(each) {
+    const gl = this.gl;
+    gl.depthFunc(gl.LEQUAL);
+    gl.colorMask(false, false, false, false);
+    this.drawPart(each, CLEAR);
+    gl.colorMask(true, true, true, true);
+    this.drawPart(each, CLEAR);
+    gl.depthFunc(gl.LESS);
+  }
+
+  drawPart({part, model}, texels = this.isClear(part) ? OPAQUE : HALF_OPAQUE) {
     if (part.lit) {
       this.bind(3, part.lit.colors);
       this.gl.useProgram(this.triangles.program);
       this.triangles.set({modelProjection: times(this.shared.viewProjection, model), colors: 3});
     } else {
-      this.look("surface", part, model);
+      this.look("surface", part, model, texels);
     }
     const drawn = part.lit || part;
     this.mesh(drawn, drawn.all);
   }
 
   // The program that lights a part, with its look.
-  look(kind, part, model) {
+  look(kind, part, model, texels = HALF_OPAQUE) {
     const heat = this.heated && part.target;
     const image = heat ? null : this.imageOf(part);
     const color = heat ? HEATED : part.color;
@@ -249,6 +273,7 @@ class Drawing {
     this.use(this.lighting(kind, part, image, heat), {
       model,
       open: Number(part.open),
+      texels,
       ...(color && {color}),
       base: [part.roughness, part.metallic, part.sheen, part.coat],
       volume: [part.translucency, part.transparency, part.emission, part.opacity],

@@ -20,7 +20,8 @@ function partOf(gl, part, cell) {
   });
   gl.bindVertexArray(array);
   const buffers = [3, 3, 2, 1].map((size, i) => vertexBuffer(gl, i, size, data[i], part.target && i !== 2));
-  const coarse = clustered(data[0], index, cell);
+  const casting = part.casting === undefined ? index : index.subarray(0, 3 * part.casting);
+  const coarse = clustered(data[0], casting, cell);
   const all = indexBuffer(gl, index);
   const shadow = {...indexBuffer(gl, coarse), index: coarse, reaches: reachesOf(data[0], coarse)};
   return Object.assign(part, {

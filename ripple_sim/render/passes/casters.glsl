@@ -1,11 +1,14 @@
 #version 410
 // Objects as a light or the floor sees them; MAP is the kind of the map (see contract.py, soft_shadows.glsl). With MOVED
-// the vertices are displaced vertices of a target.
+// the vertices are displaced vertices of a target, and TEXELS tells which texels of its texture are drawn.
 #include "glsl/frame.glsl"
 
 VARYING vec3 albedo;
 #if MOVED
 VARYING vec3 world;
+#if TEXELS != ALL_TEXELS
+VARYING vec3 mapped;
+#endif
 #endif
 
 #stage vertex
@@ -13,6 +16,9 @@ uniform mat4 matrix;
 
 #if MOVED
 in vec4 in_moved;
+#if TEXELS != ALL_TEXELS
+in vec3 in_mapped;
+#endif
 
 uniform vec3 color;  // linear
 
@@ -20,6 +26,9 @@ void main()
 {
     albedo = color;
     world = in_moved.xyz;
+#if TEXELS != ALL_TEXELS
+    mapped = in_mapped;
+#endif
     gl_Position = matrix * vec4(world, 1.0);
 }
 #else
@@ -40,6 +49,27 @@ void main()
 #endif
 
 #stage fragment
+#if TEXELS != ALL_TEXELS
+#include "glsl/texture_mapping.glsl"
+#include "glsl/opacity.glsl"
+
+uniform vec4 tiling;
+
+// Opacity of the texel; discards a texel that is not drawn.
+float drawn_opacity()
+{
+    float opacity = texel_opacity(mapped.xy * tiling.xy + tiling.zw);
+    if (!is_drawn(opacity))
+        discard;
+    return opacity;
+}
+#else
+float drawn_opacity()
+{
+    return 1.0;
+}
+#endif
+
 #if MAP == TRANSMISSION_MAP
 uniform int light;
 uniform vec3 transmission;  // share of the light that passes a refracting surface which it meets head on
@@ -54,7 +84,10 @@ out vec4 fragment;
 void main()
 {
     vec3 passes = transmission;
-#if MOVED
+#if TEXELS == CLEAR_TEXELS
+    passes = mix(vec3(1.0), transmission, drawn_opacity());
+#elif MOVED
+    drawn_opacity();
     vec4 place = lights[light].position;
     vec3 towards = place.w == 0.0 ? lights[light].direction.xyz : normalize(place.xyz - world);
     vec3 normal = cross(dFdx(world), dFdy(world));
@@ -75,8 +108,12 @@ out vec4 fragment;
 
 void main()
 {
+    drawn_opacity();
     fragment = vec4(albedo, gl_FragCoord.z);
 }
 #else
-void main() {}
+void main()
+{
+    drawn_opacity();
+}
 #endif

@@ -1,6 +1,6 @@
 #version 410
 // A target into the G-buffer, with its texture; with HEATMAP one of the solver's fields in false colours, with GRID lines
-// between blocks of texels, with HOLES holes where a flat texture is more than half transparent.
+// between blocks of texels. TEXELS tells which texels of a flat texture with opacity are drawn.
 uniform float resolution;  // texels along a chart's side
 
 VARYING vec3 normal;
@@ -34,6 +34,9 @@ void main()
 #include "glsl/g_buffer.glsl"
 #include "glsl/height_maps.glsl"
 #include "glsl/texture_mapping.glsl"
+#if TEXELS != ALL_TEXELS
+#include "glsl/opacity.glsl"
+#endif
 
 uniform vec4 color;  // linear; w: number of the object
 uniform vec4 tiling;
@@ -72,8 +75,9 @@ float grid_ink(vec2 place, float resolution)
 
 void main()
 {
-#if HOLES && MAPPING == FLAT_IMAGE
-    if (texture(image, mapped.xy * tiling.xy + tiling.zw).a < 0.5)
+#if TEXELS != ALL_TEXELS
+    float opacity = texel_opacity(mapped.xy * tiling.xy + tiling.zw);
+    if (!is_drawn(opacity))
         discard;
 #endif
     vec3 shown = sqrt(textured(color.rgb, mapped, tiling));
@@ -85,6 +89,9 @@ void main()
 #endif
 #if GRID
     ink = grid_ink(place, resolution);
+#endif
+#if TEXELS == CLEAR_TEXELS
+    ink = opacity;
 #endif
     bool inner = !gl_FrontFacing;  // of an open surface: closed ones show their outer side alone
     encode_surface(inner ? -normal : normal, inside / vec2(textureSize(height_maps, 0).xy), shown,

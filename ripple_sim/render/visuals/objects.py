@@ -24,7 +24,7 @@ from ripple_sim.render.tone_mapping import srgb_to_linear
 from .scene_entries import outgrown_assets
 from .surroundings import horizon_of
 from .uploads import WrittenAssets
-from .visual import Look, texture_pixels, texture_pixels_with_holes
+from .visual import Look, texture_is_half_clear, texture_pixels, texture_pixels_with_opacity
 
 _ROW = OBJECT.dtype
 
@@ -186,6 +186,7 @@ class Assets:
         self.objects = ObjectTable(resources)
         self._uploaded: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
         self._mean_colors: dict[int, NDArray[np.float64]] = {}
+        self._half_clear: dict[int, bool] = {}
         self.levels: dict[str, Any] = {}
         self.version = 0
         self.reshaped: set[tuple[str, int]] = set()
@@ -207,8 +208,9 @@ class Assets:
         self.version += 1
         if kind == "texture":
             self._mean_colors.pop(index, None)
+            self._half_clear.pop(index, None)
             if index in self._uploaded:
-                pixels = texture_pixels_with_holes(self.model, index)
+                pixels = texture_pixels_with_opacity(self.model, index)
                 write_srgb(self.resources, self._uploaded[index], pixels)
             return
         self.reshaped.add((kind, index))
@@ -219,7 +221,7 @@ class Assets:
     def texture(self, texture: int) -> moderngl.Texture | moderngl.TextureCube:
         """Return the texture of an id; it reads as linear light."""
         if texture not in self._uploaded:
-            pixels = texture_pixels_with_holes(self.model, texture)
+            pixels = texture_pixels_with_opacity(self.model, texture)
             flat = self.model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
             self._uploaded[texture] = (srgb_texture if flat else srgb_cube)(self.resources, pixels)
         return self._uploaded[texture]
@@ -233,6 +235,12 @@ class Assets:
             linear = srgb_to_linear(pixels[::step, ::step] / 255.0)
             self._mean_colors[texture] = linear.mean(axis=(0, 1))
         return self._mean_colors[texture]
+
+    def is_half_clear(self, texture: int) -> bool:
+        """Whether the texture of an id has texels that are neither opaque nor clear."""
+        if texture not in self._half_clear:
+            self._half_clear[texture] = texture_is_half_clear(self.model, texture)
+        return self._half_clear[texture]
 
     def skybox(self) -> Skybox | None:
         """Return the model's skybox, or None."""

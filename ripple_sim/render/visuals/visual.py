@@ -26,6 +26,7 @@ GEOM_OBJECT = int(mujoco.mjtObj.mjOBJ_GEOM)
 SITE_OBJECT = int(mujoco.mjtObj.mjOBJ_SITE)
 _VISIBLE_GROUPS = 3  # MuJoCo shows groups 0 to 2 by default
 _DEFAULT_RGBA = [0.5, 0.5, 0.5, 1.0]  # of a geom or site where the MJCF gives no colour
+_HALF_CLEAR = (6, 241)  # opacities of texels that are neither clear nor opaque, as in opacity.glsl
 
 
 @dataclass(frozen=True)
@@ -388,17 +389,29 @@ def texture_pixels(model: Any, texture: int) -> NDArray[np.uint8]:
     return np.ascontiguousarray(colors, dtype=np.uint8)
 
 
-def texture_pixels_with_holes(model: Any, texture: int) -> NDArray[np.uint8]:
+def texture_pixels_with_opacity(model: Any, texture: int) -> NDArray[np.uint8]:
     """Like `texture_pixels`, with opacity as a fourth channel where the texture has opacity."""
-    if not texture_has_holes(model, texture):
+    if not texture_has_opacity(model, texture):
         return texture_pixels(model, texture)
     return np.ascontiguousarray(_stored_pixels(model, texture))
 
 
-def texture_has_holes(model: Any, texture: int) -> bool:
-    """Whether a model's texture is a flat one with opacity; a target has holes where it is low."""
+def texture_has_opacity(model: Any, texture: int) -> bool:
+    """Whether a model's texture is a flat one with opacity.
+
+    A target has holes where the texture is clear, and is transparent where it is clear in part.
+    """
     is_flat = model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
     return bool(is_flat and model.tex_nchannel[texture] == 4)
+
+
+def texture_is_half_clear(model: Any, texture: int) -> bool:
+    """Whether a model's texture has texels that are neither opaque nor clear."""
+    if not texture_has_opacity(model, texture):
+        return False
+    opacity = _stored_pixels(model, texture)[..., 3]
+    low, high = _HALF_CLEAR
+    return bool(((opacity >= low) & (opacity <= high)).any())
 
 
 def _stored_pixels(model: Any, texture: int) -> NDArray[np.uint8]:

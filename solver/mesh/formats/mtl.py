@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from ..looks import BLEND, CLAMP, MASK, OPAQUE, REPEAT, ImageSource, Paint, linear_light
+from ..looks import BLEND, CLAMP, OPAQUE, REPEAT, ImageSource, Paint, linear_light
 from .text import decoded
 
 # Options of a texture and the most numbers or words that each takes.
@@ -130,9 +130,7 @@ def _material(said: dict[str, str], folders: list[Path]) -> ObjMaterial:
     if texture.image is not None and max(color) == 0:
         color = (1.0, 1.0, 1.0)
     opacity = _opacity(said)
-    alpha = BLEND if opacity < 1 else OPAQUE
-    if opacity_texture.image is not None:
-        alpha = MASK
+    has_opacity = opacity < 1 or opacity_texture.image is not None
     not_shown = {words for keyword, words in _NOT_SHOWN.items() if said.get(keyword)}
     if said.get("ke") and max(_color(said["ke"])) > 0:
         not_shown.add("emission")
@@ -141,7 +139,7 @@ def _material(said: dict[str, str], folders: list[Path]) -> ObjMaterial:
         image=texture.image,
         opacity=opacity_texture.image,
         wrap=(CLAMP, CLAMP) if texture.clamped else (REPEAT, REPEAT),
-        alpha=alpha,
+        alpha=BLEND if has_opacity else OPAQUE,
         metallic=_first_number(said.get("pm", "")),
         roughness=_first_number(said.get("pr", "")),
     )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MeshError
-from ..looks import Looks, Paint, linear_light, unit_range, with_opacity
+from ..looks import Looks, Paint, alpha_of, linear_light, unit_range, with_opacity
 from ..soup import Soup, too_small, triangulate
 from .text import decoded, numbers, three, whole
 
@@ -66,7 +66,8 @@ def read_off(path: Path) -> Soup:
         colors = None if of_vertices is None else of_vertices[F]
     looks = None
     if colors is not None:
-        looks = Looks((Paint(),), np.zeros(len(F), np.int64), colors)
+        paint = Paint(alpha=alpha_of(colors))
+        looks = Looks((paint,), np.zeros(len(F), np.int64), colors)
     return Soup(V, F, corner_uv, too_small(sizes), looks)
 
 
@@ -212,4 +213,6 @@ def _colors(words: list[list[str]]) -> NDArray[np.float64]:
     rgb = itertools.chain.from_iterable(color[:3] for color in words)
     flat = numbers(list(rgb)).reshape(-1, 3)
     values[:, :3] = unit_range(flat)
+    with_alpha = [i for i, color in enumerate(words) if len(color) == 4]
+    values[with_alpha, 3] = unit_range(numbers([words[i][3] for i in with_alpha]))
     return with_opacity(linear_light(values))

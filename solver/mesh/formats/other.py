@@ -153,7 +153,8 @@ def _paint(path: Path, material: dict[str, Any]) -> Paint:
     red, green, blue = linear_light(np.array(material["color"])).tolist()
     if image is not None and max(red, green, blue) == 0:
         red = green = blue = 1.0
-    opacity = material["opacity"]
+    # files of several programs say 0 where they mean nothing
+    opacity = material["opacity"] or 1.0
     return Paint((red, green, blue, opacity), image, alpha=BLEND if opacity < 1 else OPAQUE)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MeshError
-from ..looks import ImageSource, Looks, Paint, linear_light, unit_range, with_opacity
+from ..looks import ImageSource, Looks, Paint, alpha_of, linear_light, unit_range, with_opacity
 from ..soup import Soup, too_small, triangulate
 from .mtl import found_file
 
@@ -288,7 +288,7 @@ def _looks(
     if paints:
         # beside an image, programs store colours that are not meant to tint it
         return Looks(paints, paint)
-    return None if colors is None else Looks((Paint(),), paint, colors)
+    return None if colors is None else Looks((Paint(alpha=alpha_of(colors)),), paint, colors)
 
 
 def _corner_uv(

@@ -68,7 +68,7 @@ def test_options_scale_move_and_clamp_the_image_and_colours_multiply_it(tmp_path
     uv = mesh.V[mesh.F][..., :2] * [3, 2] + [0.5, 0.25]
     np.testing.assert_allclose(mesh.corner_uv, uv)
     assert paint.wrap == ("clamp", "clamp") and paint.color == linear(0.5, 0.5, 1, 1)
-    assert (paint.alpha, paint.opacity.name) == ("mask", "b.png")
+    assert (paint.alpha, paint.opacity.name) == ("blend", "b.png")
     assert (paint.metallic, paint.roughness) == (0.5, 0.75)
     assert mesh.looks.notes == ("not shown of its materials: emission, normal maps",)
 
@@ -236,6 +236,17 @@ def test_colours_of_off_vertices(tmp_path: Path, header: str, colors: str) -> No
     rows = "\n".join(f"{row} {colors}" for row in ROWS)
     mesh = load_mesh(written(tmp_path, "a.off", f"{header}\n4 2 0\n{rows}\n3 0 1 2\n3 0 2 3\n"))
     assert (mesh.looks.colors == [1, 0, 0, 1]).all()
+
+
+@pytest.mark.parametrize(
+    ("opacity", "alpha"), [(255, "opaque"), (128, "blend"), (0, "opaque"), (1, "opaque")]
+)
+def test_colours_of_vertices_have_opacity_unless_all_are_clear(
+    tmp_path: Path, opacity: int, alpha: str
+) -> None:
+    rows = "\n".join(f"{row} 255 0 0 {opacity}" for row in ROWS)
+    mesh = load_mesh(written(tmp_path, "a.off", f"COFF\n4 2 0\n{rows}\n3 0 1 2\n3 0 2 3\n"))
+    assert mesh.looks.paints[0].alpha == alpha
 
 
 def test_coordinates_and_face_colours_of_off_files(tmp_path: Path) -> None:
