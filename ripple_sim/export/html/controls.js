@@ -1,7 +1,5 @@
 // Buttons, keys, sliders and the pointer.
 const RATE = 30; // frames a second that it takes care to show
-const LATE = 1.1; // by how much they may be late before fewer pixels are drawn
-const COARSEST = 0.6; // share of the pixels along a side, at least
 const REFRESH = 17; // of the screen [ms]
 // of time that passes between two pictures [s]: after a rest, or where it is slow, time waits
 const LONGEST_TICK = 0.1;
@@ -85,6 +83,7 @@ function buttons(player, ui) {
     player.redraw();
   };
   of("picture").onclick = () => savePicture(player);
+  of("full").hidden = !document.fullscreenEnabled; // as on some phones
   of("full").onclick = () =>
     document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
   of("tune").onclick = () => {
@@ -269,52 +268,51 @@ function moveCamera(player, down, event) {
 
 // Lets time pass while it plays and is in view.
 function clock(player, ui) {
+  // where software draws, a frame takes most of the time between two of them
+  const shortest = player.drawing.software ? 900 / RATE : 0; // [ms]
   let last = performance.now();
   let drawn = last;
-  let late = 1;
   let seen = true;
   new IntersectionObserver(entries => {
     seen = entries.pop().isIntersecting;
   }).observe(player.canvas);
+
+  // Shows what has arrived from the program.
+  const showNewest = async now => {
+    if (player.playing) ui.dragging(now);
+    const isNew = player.following && player.newest > player.number;
+    if (!isNew || now - drawn <= shortest) return;
+    await player.show(player.newest);
+    drawn = now;
+    ui.follow();
+  };
+
+  // Goes on in the recorded run, or after its end.
+  const advance = async (now, seconds, rate) => {
+    ui.dragging(now);
+    const next = player.number + seconds * player.meta.fps;
+    const end = player.frames.count - (player.live ? 1 : 0);
+    const due = player.live ? now - drawn > shortest : Math.floor(next) !== player.onCanvas;
+    if (player.frames.ended && next >= end) {
+      if (player.live) await liveOn(player, end, next);
+      else await player.show(0);
+    } else if (due) await player.show(next);
+    else player.number = next;
+    if (!due) return;
+    player.detail.add(now - drawn, Math.max(1000 / rate, 1000 / RATE));
+    drawn = now;
+    ui.follow();
+  };
+
   const tick = async now => {
-    const speed = Number(ui.of("speed").value) * player.meta.fps;
-    const count = player.frames.count;
-    const elapsed = Math.min((now - last) / 1000, LONGEST_TICK) * Number(ui.of("speed").value);
+    const speed = Number(ui.of("speed").value);
+    const rate = speed * player.meta.fps; // recorded frames a second
+    const seconds = speed * Math.min((now - last) / 1000, LONGEST_TICK);
     last = now;
-    if (player.send && seen) {
-      if (player.playing) ui.dragging(now);
-      if (
-        player.following &&
-        player.newest > player.number &&
-        now - drawn > (player.drawing.software ? 900 / RATE : 0)
-      ) {
-        await player.show(player.newest);
-        drawn = now;
-        ui.follow();
-      }
-    } else if (player.playing && seen) {
-      ui.dragging(now);
-      const next = player.number + elapsed * player.meta.fps;
-      const over = player.frames.ended && next >= count - (player.live ? 1 : 0);
-      const due = player.live
-        ? now - drawn > (player.drawing.software ? 900 / RATE : 0)
-        : Math.floor(next) !== player.onCanvas;
-      if (over && player.live) await liveOn(player, count - 1, next);
-      else if (over) await player.show(0);
-      else if (due) await player.show(next);
-      else player.number = next;
-      if (due) {
-        late += 0.03 * (Math.min((now - drawn) / Math.max(1000 / speed, 1000 / RATE), 3) - late);
-        if (late > LATE && player.detail > COARSEST) {
-          player.detail *= 0.8;
-          late = 1;
-        }
-        drawn = now;
-        ui.follow();
-      }
-    }
+    if (player.send && seen) await showNewest(now);
+    else if (player.playing && seen) await advance(now, seconds, rate);
     // where the next frame is far off, the browser may rest
-    const rest = player.live ? 0 : (1000 * (1 - (player.number % 1))) / speed - REFRESH;
+    const rest = player.live ? 0 : (1000 * (1 - (player.number % 1))) / rate - REFRESH;
     setTimeout(() => requestAnimationFrame(tick), player.playing ? Math.max(Math.min(rest, 100), 0) : 0);
   };
   requestAnimationFrame(tick);

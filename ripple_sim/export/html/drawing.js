@@ -19,7 +19,7 @@ class Drawing {
     });
     if (!gl) throw new Error("this browser has no WebGL 2");
     Object.assign(this, {gl, canvas, meta, software});
-    this.shadowSize = software ? 512 : 1024;
+    this.shadowSize = software ? 384 : 1024;
     this.makePrograms();
     this.images = {};
     this.blank = colorsTexture(gl, [[255, 255, 255]]);
@@ -43,7 +43,7 @@ class Drawing {
     this.target = framebufferOf(gl, {DEPTH_ATTACHMENT: this.shadow, COLOR_ATTACHMENT0: this.blockers});
     this.shades = tableOf(gl, "R8", this.shadowSize / 2, this.shadowSize / 2, LINEAR);
     this.shadeTarget = framebufferOf(gl, {COLOR_ATTACHMENT0: this.shades});
-    this.screen = tableOf(gl, "RGBA8", 1, 1, LINEAR, 0);
+    this.smoothing = software && new Smoothing(gl, canvas);
   }
 
   async load() {
@@ -77,7 +77,6 @@ class Drawing {
     this.sky = programOf(gl, EVERYWHERE_VERTEX, skyFragment(light));
     this.depth = programOf(gl, DEPTH_VERTEX, DEPTH_FRAGMENT);
     this.shading = programOf(gl, DEPTH_VERTEX, SHADE_FRAGMENT, [`SIZE ${shadowSize}.0`]);
-    this.smoothing = programOf(gl, EVERYWHERE_VERTEX, SMOOTH_FRAGMENT);
     this.triangles = programOf(gl, LIT_POINTS_VERTEX, LIT_POINTS_FRAGMENT);
     this.shaders = {
       surface: [SURFACE_VERTEX, surfaceFragment(light, lit)],
@@ -159,7 +158,7 @@ class Drawing {
     }
     gl.disable(gl.BLEND);
     for (const model of arrows) this.drawPart({part: this.arrow, model});
-    if (this.software) this.smooth();
+    if (this.smoothing) this.smooth(bodies, view, arrows);
   }
 
   // Lights the points of a target for `drawPart`.
@@ -172,16 +171,11 @@ class Drawing {
     this.cover();
   }
 
-  // Smooths the edges on the canvas.
-  smooth() {
-    const gl = this.gl;
-    this.bind(1, this.screen);
-    gl.copyTexImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 0, 0, this.canvas.width, this.canvas.height, 0);
-    gl.disable(gl.DEPTH_TEST);
-    gl.disable(gl.CULL_FACE);
-    gl.useProgram(this.smoothing.program);
-    this.smoothing.set({image: 1});
-    this.cover();
+  // Smooths the edges of the parts and of the arrows; everything where the floor's rim is seen.
+  smooth(bodies, view, arrows) {
+    const parts = this.parts.map(part => ({part, model: times(bodies[part.body], part.local)}));
+    for (const model of arrows) parts.push({part: this.arrow, model});
+    this.smoothing.draw(parts, view.matrix, this.floor && this.floor.ends);
   }
 
   // Parts with their places, the most opaque first.

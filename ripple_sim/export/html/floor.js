@@ -13,6 +13,7 @@ const ROWS = 24; // of the picture, each of which the sky is drawn in or not
 class Floor {
   constructor(gl, floor, shaders, plain) {
     Object.assign(this, {gl, floor, side: 2 * HALF, row: 2 * HALF + 1});
+    // `bare`: from where to where the picture shows the sky; `ends`: whether the floor's rim may be seen
     this.programs = [[], ["SHADOW"]].map(more =>
       programOf(gl, ...shaders, [...(plain ? ["PLAIN"] : []), ...more]),
     );
@@ -34,6 +35,7 @@ class Floor {
     const middle = axes.map(axis => dot(off, axis));
     this.place(middle, view.distance, reach, times(view.matrix, frame));
     this.bare = this.leaves(view, frame);
+    this.ends = this.bare !== null && this.floor.half.some((half, i) => half && half < Math.abs(middle[i]) + reach);
     this.shade(frame, light, casters, middle, view.distance, reach);
     this.list();
     gl.bindVertexArray(this.array);

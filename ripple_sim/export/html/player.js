@@ -84,7 +84,7 @@ class Player {
       heat: false,
       contacts: false,
       grid: false,
-      detail: 1,
+      detail: new Detail(),
     });
     this.orbit = null; // azimuth and elevation [radians], distance and focus; null: the scene's camera
     this.poked = false;
@@ -222,7 +222,7 @@ class Player {
 
   redraw() {
     if (!this.frame || this.drawing.lost) return;
-    const scale = (window.devicePixelRatio || 1) * (this.playing ? this.detail : 1);
+    const scale = (window.devicePixelRatio || 1) * (this.playing ? this.detail.share : 1);
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map(x =>
       Math.max(1, Math.round(x * scale)),
     );

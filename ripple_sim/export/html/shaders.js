@@ -9,7 +9,6 @@ const LIT_POINTS_FRAGMENT = shaderOf("lit_points.frag");
 const DEPTH_VERTEX = shaderOf("depth.vert");
 const DEPTH_FRAGMENT = shaderOf("depth.frag");
 const SHADE_FRAGMENT = shaderOf("shade.frag");
-const SMOOTH_FRAGMENT = shaderOf("smooth.frag");
 
 const surfaceFragment = (light, lit) => light + lit + shaderOf("surface.frag");
 const pointsFragment = (light, lit) => light + lit + shaderOf("points.frag");
