@@ -105,7 +105,7 @@ HAMMOCK = f"""<mujoco>{HEAD}<worldbody>
 </worldbody></mujoco>"""
 
 
-def test_a_cloth_around_a_ball_is_pressed_by_more_than_the_lost_momentum(recwarn):
+def test_a_cloth_that_wraps_a_ball_is_pressed_by_more_than_it_loses(recwarn):
     """Forces on slopes cancel as vectors; the surface gets the sum of the normal forces."""
     run = begun(HAMMOCK, "cloth")
     model = run.model
