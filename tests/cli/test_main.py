@@ -9,7 +9,7 @@ import warnings
 from unittest.mock import Mock
 
 import pytest
-from programs import ended
+from programs import PROGRAMS, ended
 
 import ripple_sim
 from ripple_sim import bench
@@ -183,29 +183,18 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("number", "status", "word", "where"),
+    ("number", "status", "word", "while_it_is"),
     [
-        (signal.SIGINT, 130, "interrupted", "cli.parse = meet_signal"),
-        (signal.SIGTERM, 143, "terminated", "reports.InfoCommand.run = meet_signal"),
+        (signal.SIGINT, 130, "interrupted", "parsing"),
+        (signal.SIGTERM, 143, "terminated", "running"),
     ],
 )
 def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(
-    tmp_path, number, status, word, where
+    number, status, word, while_it_is
 ):
-    (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\n")
-    code = (
-        "import signal, sys\n"
-        # which a job in the background has ignored
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from ripple_sim.cli import reports\n"
-        "from ripple_sim.cli import main as cli\n"
-        "def meet_signal(argument):\n"
-        "    import slow\n"
-        "    for _ in range(10**9): pass\n"
-        f"{where}\n"
-        "sys.exit(cli.main(['info']))\n"
-    )
-    result = ended("-c", code, cwd=tmp_path, timeout=300)
+    environment = {**os.environ, "SIGNAL_ON_IMPORT": str(int(number))}
+    program = PROGRAMS / "interrupt_info.py"
+    result = ended(program, while_it_is, env=environment, timeout=300)
     assert (result.returncode, result.stderr) == (status, f"ripple-sim: {word}\n")
 
 
@@ -221,14 +210,8 @@ def test_a_warning_is_one_line_and_the_handler_is_restored(monkeypatch, capsys):
 
 
 def test_help_loads_nothing_heavy():
-    code = (
-        "import sys, ripple_sim\n"
-        "from ripple_sim.cli.main import main\n"
-        "main(['--help'])\n"
-        "heavy = {'vtkmodules', 'pyvista', 'numba', 'mujoco', 'moderngl', 'av', 'scipy'}\n"
-        "print(sorted(heavy & set(sys.modules)))\n"
-    )
-    assert ended("-c", code, check=True).stdout.splitlines()[-1] == "[]"
+    result = ended(PROGRAMS / "modules_of_help.py", check=True)
+    assert result.stdout.splitlines()[-1] == "[]"
 
 
 LONG = "a" * 5000

@@ -13,6 +13,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from programs import PROGRAMS
 from scene_files import write_scene
 
 from ripple_sim.cli import frame_progress, main as cli, reports
@@ -110,28 +111,20 @@ def test_an_error_passes_through_the_progress_bar(monkeypatch: pytest.MonkeyPatc
         raise KeyboardInterrupt
 
 
-def completed(script: str, line: str) -> set[str]:
+def completed(script: Path, line: str) -> set[str]:
     """What bash offers for the last word of a line."""
-    words = line.split(" ")
-    quoted = " ".join(f"'{word}'" for word in words)
-    # the script says itself which function completes the program's name
-    trial = f"""{script}
-set -- $(complete -p ripple-sim)
-while [ "$1" != -F ]; do shift; done
-COMP_WORDS=({quoted}); COMP_CWORD={len(words) - 1}; COMP_LINE='{line}'; COMP_POINT={len(line)}
-"$2" ripple-sim '{words[-1]}' '{words[-2]}'
-printf '%s\\n' "${{COMPREPLY[@]}}"
-"""
-    result = subprocess.run(
-        ["bash", "--norc", "-c", trial], capture_output=True, text=True, check=True
-    )
+    words = ["bash", "--norc", PROGRAMS / "complete.bash", script, *line.split(" ")]
+    result = subprocess.run(words, capture_output=True, text=True, check=True)
     return {word.strip() for word in result.stdout.split()}
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
-def test_bash_completes_commands_options_and_choices(capsys: pytest.CaptureFixture[str]) -> None:
+def test_bash_completes_commands_options_and_choices(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert cli.main(["completion", "bash"]) == 0
-    script = capsys.readouterr().out
+    script = tmp_path / "completion.bash"
+    script.write_text(capsys.readouterr().out)
     for line, offered in (
         ("ripple-sim re", {"render"}),
         ("ripple-sim vi", {"view"}),

@@ -8,10 +8,12 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import FunctionType
 from typing import BinaryIO
 from weakref import WeakSet
 
 import pytest
+from programs import PROGRAMS, ended
 
 from ripple_sim.cli import main as cli, signals
 from ripple_sim.encode import open_writer
@@ -37,11 +39,9 @@ def _no_timer() -> Iterator[None]:
     signal.signal(signal.SIGALRM, handler)
 
 
-def ended(program: str) -> tuple[int, str, str]:
-    """Exit status and both outputs of a Python program."""
-    result = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False
-    )
+def ending_of(program: str, **variables: str) -> tuple[int, str, str]:
+    """Exit status and both outputs of one of the tests' programs."""
+    result = ended(PROGRAMS / program, env={**os.environ, **variables}, timeout=300)
     return result.returncode, result.stdout, result.stderr
 
 
@@ -69,56 +69,38 @@ def test_a_signal_that_the_parent_ignores_stays_ignored(number: int, take: objec
     signal.raise_signal(number)  # nothing happens
 
 
-def test_a_signal_during_an_import_is_raised_after_the_import(tmp_path: Path) -> None:
+def test_a_signal_during_an_import_is_raised_after_the_import() -> None:
     """An export that was interrupted while it imported its writer left a hidden folder behind."""
-    (tmp_path / "slow.py").write_text(
-        "import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\nprint('imported')\n"
-    )
-    program = (
-        f"import sys, time\nsys.path.insert(0, {str(tmp_path)!r})\nfrom ripple_sim.cli import "
-        f"signals\n"
-        "signals.end_in_good_order()\n"
-        "try:\n    import slow\n    for _ in range(500): time.sleep(0.01)\nfinally:\n    "
-        "print('cleaned up')\n"
-    )
-    assert ended(program)[:2] == (128 + signal.SIGTERM, "imported\ncleaned up\n")
+    number = str(int(signal.SIGTERM))
+    status, output, _ = ending_of("clean_up_after_import.py", SIGNAL_ON_IMPORT=number)
+    assert status == 128 + signal.SIGTERM
+    assert output == "imported\ncleaned up\n"
 
 
 def test_signals_end_the_program_in_good_order_during_its_first_imports() -> None:
-    program = (
-        "import signal, sys\n"
-        "class Meanwhile:\n"
-        "    def find_spec(self, name, *rest):\n"
-        "        name == 'ripple_sim.cli.main' and signal.raise_signal(signal.SIGHUP)\n"
-        "sys.meta_path.insert(0, Meanwhile())\n"
-        "sys.argv = ['ripple-sim', 'info']\nimport ripple_sim.__main__\n"
-    )
-    assert ended(program) == (128 + signal.SIGHUP, "", "ripple-sim: hung up\n")
+    status, output, errors = ending_of("hang_up_at_start.py")
+    assert status == 128 + signal.SIGHUP
+    assert (output, errors) == ("", "ripple-sim: hung up\n")
 
 
 def test_signals_during_shutdown_do_not_change_the_exit_status() -> None:
-    program = (
-        "import os\nimport ripple_sim.__main__\n"
-        "class Last:\n"
-        f"    def __del__(self, kill=os.kill, own=os.getpid(), numbers={[*map(int, ALL)]}):\n"
-        "        for number in numbers: kill(own, number)\n"
-        "last = Last()\nprint('done')\n"
-    )
-    assert ended(program) == (0, "done\n", "")
+    assert ending_of("signals_at_shutdown.py") == (0, "done\n", "")
 
 
-def within(module: str, number: int, function: str = "call") -> list[str]:
+def meet_signal(number: int, happened: list[str]) -> None:
+    os.kill(os.getpid(), number)
+    time.sleep(0.1)
+    happened.append("call ended")
+
+
+def happenings_within(module: str, number: int, function: str = "call") -> list[str]:
     """Send a signal during a function of a module; return what happened before the exception."""
+    code = meet_signal.__code__.replace(co_name=function, co_qualname=function)
+    call = FunctionType(code, {"__name__": module, "os": os, "time": time})
     happened: list[str] = []
-    code = (
-        f"def {function}():\n os.kill(os.getpid(), number)\n time.sleep(0.1)\n "
-        f"happened.append('call ended')\n"
-    )
-    names = {"__name__": module, "os": os, "time": time, "number": number, "happened": happened}
-    exec(code, names)
     signals.end_in_good_order()
     with pytest.raises((KeyboardInterrupt, SystemExit)):
-        names[function]()
+        call(number, happened)
         for _ in range(500):
             time.sleep(0.01)
         happened.append("no exception")
@@ -136,9 +118,11 @@ def test_a_signal_is_raised_only_after_calls_of_fragile_libraries_have_ended(num
     # weak set's raise
     names = [each.__name__ for each in (moderngl, ffi, render_window_interactor, sync)]
     for name in (*names, WeakSet.__module__):
-        assert within(name, number) == ["call ended"]
-    assert within(open_writer.__module__, number, open_writer.__qualname__) == ["call ended"]
-    assert within("elsewhere", number) == []
+        assert happenings_within(name, number) == ["call ended"]
+    assert happenings_within(open_writer.__module__, number, open_writer.__qualname__) == [
+        "call ended"
+    ]
+    assert happenings_within("elsewhere", number) == []
 
 
 def test_a_signal_that_a_finalizer_swallows_is_raised_again() -> None:
@@ -154,13 +138,7 @@ def test_a_signal_that_a_finalizer_swallows_is_raised_again() -> None:
 
 
 def test_a_second_signal_ends_the_process_while_the_first_is_cleaned_up() -> None:
-    program = (
-        "import signal, time\nfrom ripple_sim.cli import signals\nsignals.end_in_good_order()\n"
-        "try:\n    signal.raise_signal(signal.SIGTERM)\nfinally:\n    "
-        "signal.raise_signal(signal.SIGINT)\n"
-        "    print('cleaned up')\n"
-    )
-    status, _, err = ended(program)
+    status, _, err = ending_of("signal_during_cleanup.py")
     # a job in the background has Ctrl-C ignored, and then cleans up
     assert (status, err) in ((130, "ripple-sim: interrupted\n"), (143, ""))
 

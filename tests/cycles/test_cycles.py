@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from PIL import Image
+from programs import PROGRAMS
 from scene_files import write_scene
 
 from ripple_sim import VideoOptions, load_scene
@@ -25,27 +26,6 @@ MODEL = """<mujoco><worldbody><light pos="1 0 2" dir="-1 0 -2" diffuse="1 1 1"/>
 <geom name="egg" size="0.2" pos="0 0 0.2"/><body pos="0 0 0.6"><freejoint/><geom size="0.05"/>
 </body>
 </worldbody></mujoco>"""
-
-# makes frames of its settings: as bright as their numbers, of the size that is asked for
-STAND_IN = """#!{python}
-import json, sys, tempfile
-if sys.argv[1] == "-c":  # which bpy?
-    sys.exit(print({version!r}))
-from pathlib import Path
-import numpy as np
-settings = json.loads(Path(sys.argv[2]).read_text())
-assert tempfile.gettempdir() == settings["folder"]  # it may leave things there
-Path({told!r}).write_text(json.dumps(settings))
-assert Path(settings["stage"]).stat().st_size > 1000
-for number in range(settings["frames"]):
-    if number == {fails}:
-        sys.exit("out of memory")
-    width, height = settings["size"]
-    picture = np.full((height, width, 3), 0.2 * number, np.float32)
-    np.save(Path(settings["folder"], f"{{number}}.npy"), picture)
-    print("Blender's own words")
-    print(f"frame {{number}}", flush=True)
-"""
 
 
 @pytest.fixture
@@ -62,11 +42,12 @@ def folder(tmp_path: Path) -> Path:
 def stand_in(
     folder: Path, monkeypatch: pytest.MonkeyPatch, fails: int = -1, version: str = "5 0 1"
 ) -> None:
+    source = (PROGRAMS / "stand_in_for_blender.py").read_text()
     program = folder / "blender"
-    told = str(folder / "told.json")
-    program.write_text(
-        STAND_IN.format(python=sys.executable, told=told, fails=fails, version=version)
-    )
+    program.write_text(f"#!{sys.executable}\n{source}")
+    monkeypatch.setenv("BPY_VERSION", version)
+    monkeypatch.setenv("SETTINGS_COPY", str(folder / "told.json"))
+    monkeypatch.setenv("FAILING_FRAME", str(fails))
     program.chmod(0o755)
     monkeypatch.setenv(PYTHON, str(program))
 

@@ -1,13 +1,14 @@
 """Runs divided over files, which a root layer joins, and which continue after a kill."""
 
 import dataclasses
+import json
 import resource
 import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import ended
+from programs import PROGRAMS, ended
 from unfinished_videos import interrupting_at
 
 from ripple_sim import ExportOptions, RippleError, Scene, Simulation, export_scene
@@ -16,7 +17,8 @@ pytest.importorskip("pxr")
 from pxr import Usd, UsdGeom, UsdValidation
 
 # 11 frames: three chunks, the last of which is short
-OPTIONS = ExportOptions(fps=250, duration=0.044, tessellation="own", chunk=4)
+SETTINGS = {"fps": 250, "duration": 0.044, "tessellation": "own", "chunk": 4}
+OPTIONS = ExportOptions(**SETTINGS)
 SURFACE = "/World/bodies/nest/egg"
 STONE = "/World/bodies/stone"
 ATTRIBUTES = ("GetPointsAttr", "GetNormalsAttr", "GetVelocitiesAttr", "GetExtentAttr")
@@ -69,16 +71,8 @@ def test_a_killed_export_continues_to_the_same_files(
 ) -> None:
     export_scene(scene, path := tmp_path / "once" / "run.usdc", OPTIONS)
     again = tmp_path / "again" / "run.usdc"
-    code = f"""
-import os, signal
-from pathlib import Path
-from ripple_sim import ExportOptions, export_scene, load_scene
-def kill(done, frames):
-    if done == 10:
-        os.kill(os.getpid(), signal.SIGKILL)
-export_scene(load_scene({str(scene_file)!r}), Path({str(again)!r}), {OPTIONS!r}, progress=kill)
-"""
-    killed = ended("-c", code)
+    program = PROGRAMS / "export_until_killed.py"
+    killed = ended(program, scene_file, again, json.dumps(SETTINGS), "10")
     assert killed.returncode == -signal.SIGKILL, killed.stderr
     kept = sorted((again.with_name("run.usdc.part") / "frames").glob("frames_*"))
     assert [each.name for each in kept] == ["frames_00000-00003.usdc", "frames_00004-00007.usdc"]

@@ -1,8 +1,6 @@
 """The cache: kept under its limit, what was used longest ago first, nobody else's files touched."""
 
 import os
-import subprocess
-import sys
 import weakref
 from pathlib import Path
 
@@ -156,14 +154,5 @@ def test_a_result_for_an_object_is_computed_once_and_kept_while_the_object_lives
 
 
 def test_results_in_memory_are_freed_before_python_ends():
-    program = (
-        "import threading, time\n"
-        "from ripple_sim.solver.cache import ResultCache\n"
-        "class Result:\n"
-        "    def __del__(self): print('freed', flush=True)\n"
-        "cache = ResultCache(1, lambda result: True)\n"
-        "cache.get('key', Result)\n"
-        "threading.Thread(target=lambda kept: time.sleep(60), args=(cache,), daemon=True).start()\n"
-    )
-    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    result = ended(PROGRAMS / "keep_result_until_exit.py")
     assert (result.stdout, result.stderr) == ("freed\n", "")

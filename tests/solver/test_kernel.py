@@ -13,7 +13,7 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
-from programs import ended
+from programs import PROGRAMS, ended
 from waves_on_two_surfaces import heights
 
 from ripple_sim.solver.compile_clock import compile_times, compiling, work_clock
@@ -93,20 +93,7 @@ def test_the_first_call_is_compilation_and_the_second_is_work() -> None:
     assert compile_times()[__name__] == known + compiled
 
 
-LIBRARY = """
-from ripple_sim.solver.kernel import kernel
-
-@kernel
-def sum_of(x):
-    total = 0.0
-    for each in x:
-        total += each
-    return total
-
-@kernel
-def value_at(x, i):
-    return x[i]
-"""
+LIBRARY = (PROGRAMS / "library_of_kernels.py").read_text()
 
 
 @pytest.fixture

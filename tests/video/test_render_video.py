@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 import pytest
 from PIL import Image
-from programs import ended
+from programs import PROGRAMS, ended
 from unfinished_videos import MJCF, contents, egg_scene, interrupting_at
 
 from ripple_sim import ExportOptions, Simulation, export_scene, render_video
@@ -117,26 +117,9 @@ def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene,
 
 @pytest.mark.parametrize("ahead", [False, True])
 def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
-    program = (
-        "import ctypes, sys\n"
-        "from ripple_sim.cli import main as cli\n"
-        "from ripple_sim.solver.gl import GLContext, shared_context\n"
-        + "GLContext.software = False\n"
-        * ahead  # a frame is on its way back when it happens
-        + "def lose(done, total):\n"
-        "    if done == 16:\n"
-        "        egl = ctypes.CDLL('libEGL.so.1')\n"
-        "        egl.eglGetCurrentDisplay.restype = ctypes.c_void_p\n"
-        "        with shared_context():\n"
-        "            egl.eglTerminate(ctypes.c_void_p(egl.eglGetCurrentDisplay()))\n"
-        "from ripple_sim.video import render_video as module\n"
-        "render = module.render_video\n"
-        "module.render_video = lambda *args, **others: render(*args, **{**others, 'progress': "
-        "lose})\n"
-        "sys.exit(cli.main(['render', *sys.argv[1:], *'--size 64x48 --fps 30 --backend cpu "
-        "--duration 0.6'.split()]))\n"
-    )
-    result = ended("-c", program, tmp_path / "scene.toml", "-o", tmp_path / "frames")
+    driver = "hardware" if ahead else "software"
+    program = PROGRAMS / "render_until_context_is_lost.py"
+    result = ended(program, driver, tmp_path / "scene.toml", "-o", tmp_path / "frames")
     assert result.returncode == 1
     lines = [
         line

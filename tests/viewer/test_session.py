@@ -5,7 +5,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from programs import ended
+from programs import PROGRAMS, ended
 from scene_files import write_scene
 
 from ripple_sim.errors import SceneError, SimulationError
@@ -141,14 +141,7 @@ def test_an_unstable_run_is_paused_and_can_restart(
 
 
 def test_a_session_needs_no_vtk() -> None:
-    code = (
-        "import sys\nfrom ripple_sim.viewer.opening import open_scene\nfrom "
-        "ripple_sim.viewer.session import Session\n"
-        "from ripple_sim.viewer import page_server, page_view\n"
-        "session = Session(open_scene('sphere'), resolution=8)\nsession.advance()\n"
-        "print(sorted({name.split('.')[0] for name in sys.modules} & {'vtkmodules', 'pyvista'}))"
-    )
-    result = ended("-c", code, check=True)
+    result = ended(PROGRAMS / "modules_of_session.py", check=True)
     assert result.stdout.splitlines()[-1] == "[]"
 
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from mujoco_models import forwarded
-from programs import ended
+from programs import PROGRAMS, ended
 from scipy.ndimage import maximum_filter, minimum_filter
 from sphere_height_maps import cube_charts
 from textured import textured_model
@@ -101,22 +101,6 @@ SHELF = "".join(
     ]
 )
 
-THEIRS = """
-import sys, mujoco, numpy as np
-frames = []
-for path in sys.argv[2:]:
-    model = mujoco.MjModel.from_binary_path(path)
-    model.vis.headlight.ambient[:], model.vis.headlight.diffuse[:] = 1, 0
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    camera = mujoco.MjvCamera()
-    camera.distance, camera.azimuth, camera.elevation = 4.2, 70, -50
-    with mujoco.Renderer(model, 240, 320) as renderer:
-        renderer.update_scene(data, camera)
-        frames.append(renderer.render())
-np.save(sys.argv[1], frames)
-"""
-
 
 def colours(frame) -> np.ndarray:
     """Which of red, green and blue each pixel has."""
@@ -138,9 +122,9 @@ def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
     paths = [str(tmp_path / f"{i}.mjb") for i in range(len(models))]
     for model, path in zip(models, paths, strict=True):
         mujoco.mj_saveModel(model, path, None)
-    done = ended(
-        "-c", THEIRS, tmp_path / "theirs.npy", *paths, env={**os.environ, "MUJOCO_GL": "egl"}
-    )
+    environment = {**os.environ, "MUJOCO_GL": "egl"}
+    program = PROGRAMS / "draw_with_mujoco.py"
+    done = ended(program, tmp_path / "theirs.npy", *paths, env=environment)
     if done.returncode:
         pytest.skip(f"MuJoCo's renderer does not run here: {done.stderr[-200:]}")
     for model, theirs, variant in zip(

@@ -4,7 +4,6 @@ import gc
 import os
 import re
 import sys
-import textwrap
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 import moderngl
 import numpy as np
 import pytest
-from programs import ended
+from programs import PROGRAMS, ended
 
 from ripple_sim.solver import GLError, Material, WaveSolver, sphere_atlas
 from ripple_sim.solver.gl import (
@@ -58,31 +57,13 @@ def test_errors_of_moderngl_become_one_error(gl_backend: str) -> None:
         ctx.buffer(b"1234").read(size=8)
 
 
-def printed(script: str) -> str:
-    """What a process of its own prints."""
-    return ended("-c", textwrap.dedent(script), timeout=300, check=True).stdout
+def output_of(program: str) -> str:
+    """What one of the tests' programs prints, in a process of its own."""
+    return ended(PROGRAMS / program, timeout=300, check=True).stdout
 
 
 def test_lost_context_is_reported(opengl: None) -> None:
-    script = """
-        import ctypes, sys
-        from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
-        from ripple_sim.solver.gl import current, shared_context
-        waves = WaveSolver(sphere_atlas(1.0, 8), backend="gl")
-        library = current.load_egl()
-        for function in (library.eglGetCurrentDisplay, library.eglGetPlatformDisplay):
-            function.restype = ctypes.c_void_p
-        with shared_context():
-            display = library.eglGetCurrentDisplay()
-        none = ctypes.c_void_p(None)
-        library.eglMakeCurrent(ctypes.c_void_p(display), none, none, none)
-        library.eglTerminate(ctypes.c_void_p(display))
-        try:
-            waves.height
-        except GLError as error:
-            print(error)
-    """
-    assert "is lost" in printed(script)
+    assert "is lost" in output_of("lose_context.py")
 
 
 def test_solvers_in_several_threads_take_turns(gl_backend: str) -> None:
@@ -126,26 +107,7 @@ def test_a_thread_that_never_leaves_the_context_is_named(
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_fork_is_refused_with_advice_and_auto_takes_the_cpu(opengl: None) -> None:
-    script = """
-        import os, sys
-        from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
-        from ripple_sim.solver.gl import context
-        waves = WaveSolver(sphere_atlas(1.0, 8), backend="gl")
-        context._lock.acquire()  # as if another thread made a context
-        if os.fork():
-            os.wait()
-            sys.exit(0)
-        for backend in ("gl", "auto"):
-            try:
-                print(WaveSolver(sphere_atlas(1.0, 8), backend=backend).backend, flush=True)
-            except GLError as error:
-                print(error, flush=True)
-        try:
-            waves.height
-        except GLError as error:
-            print(error, flush=True)
-    """
-    lines = printed(script).splitlines()
+    lines = output_of("solve_after_fork.py").splitlines()
     assert len(lines) == 3 and lines[1] == "cpu"
     assert all(
         "is a fork; start processes with multiprocessing's method 'spawn'" in lines[i]
@@ -217,17 +179,12 @@ def test_a_device_below_zero_is_refused_before_anything_is_read_there(
         create_context(None)
 
 
-def drawing_threads(**environment: str) -> int:
+def drawing_threads(**variables: str) -> int:
     """How many threads llvmpipe has in a process with our context; other drivers are skipped."""
-    script = """
-        from pathlib import Path
-        from ripple_sim.solver.gl import shared_context
-        print(shared_context().renderer)
-        names = [comm.read_text() for comm in Path("/proc/self/task").glob("*/comm")]
-        print(sum(name.startswith("llvmpipe-") for name in names))
-    """
-    usual = {name: value for name, value in os.environ.items() if name != "LP_NUM_THREADS"}
-    done = ended("-c", textwrap.dedent(script), env=usual | environment, timeout=300, check=True)
+    environment = {name: value for name, value in os.environ.items() if name != "LP_NUM_THREADS"}
+    environment.update(variables)
+    program = PROGRAMS / "count_drawing_threads.py"
+    done = ended(program, env=environment, timeout=300, check=True)
     renderer, count = done.stdout.splitlines()
     if "llvmpipe" not in renderer:
         pytest.skip("needs the driver llvmpipe")
@@ -265,8 +222,8 @@ def test_the_error_without_any_device_names_the_packages_to_install(
 def test_a_driver_that_is_too_old_is_named_with_its_version_and_the_one_needed(
     opengl: None,
 ) -> None:
-    code = "from ripple_sim.solver.gl import create_context; create_context(None)"
-    result = ended("-c", code, env={**os.environ, "MESA_GL_VERSION_OVERRIDE": "4.0"})
+    environment = {**os.environ, "MESA_GL_VERSION_OVERRIDE": "4.0"}
+    result = ended(PROGRAMS / "count_drawing_threads.py", env=environment)
     assert re.search(
         r"GLError: .+ has OpenGL 4\.0; rendering needs 4\.1 or later, backend 'gl' 4\.3",
         result.stderr,
