@@ -1,5 +1,7 @@
 """Displaced vertices in the world: splines on GPU and CPU, against a sum over texels."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from sphere_height_maps import cube_charts, height_map_of
@@ -19,7 +21,18 @@ from ripple_sim.solver.texels import ChartPage
 
 N = 8
 PAGE = ChartPage(6, N)
-STILL = np.eye(3), np.zeros(3), 0  # rotation, origin, occluders
+HEIGHT = 3  # channel of a height map; the others are the gradient
+
+
+class Place(NamedTuple):
+    """Where a target is in the world."""
+
+    rotation: np.ndarray
+    origin: np.ndarray  # [m]
+    occluders: int = 0
+
+
+STILL = Place(np.eye(3), np.zeros(3))
 
 
 class NoGeoms:
@@ -34,14 +47,12 @@ def vertices_at(
     """Vertices at places in charts; the last ones are midpoints, at least one is never used."""
     chart = np.append(chart, 0)
     uv = np.concatenate([uv, [[0.5, 0.5]]])
-    positions, directions = (
-        None if each is None else [*each, [0.0, 0.0, 1.0]] for each in (positions, directions)
-    )
-    count = len(chart)
     midpoints += 1
-    attributes = np.zeros((count, UV.stop))
-    attributes[:, POSITION] = 0.0 if positions is None else positions
-    attributes[:, DIRECTION] = [0.0, 0.0, 1.0] if directions is None else directions
+    up = [0.0, 0.0, 1.0]
+    attributes = np.zeros((len(chart), UV.stop))
+    if positions is not None:
+        attributes[:, POSITION] = [*positions, up]
+    attributes[:, DIRECTION] = up if directions is None else [*directions, up]
     ends = np.zeros((midpoints, 2), dtype=np.int64)
     edges = Edges(ends, np.zeros((0, 3), dtype=np.int64), ends)
     places = page.places(np.asarray(chart), np.asarray(uv, dtype=float))
@@ -91,9 +102,8 @@ def spline_sum(height_map: np.ndarray, chart: np.ndarray, uv: np.ndarray) -> np.
     column, row = (N * uv - 0.5).T
     in_rows = weight(row[:, None] - centres)
     in_columns = weight(column[:, None] - centres)
-    return np.einsum(
-        "ki,kj,kij->k", in_rows, in_columns, height_map[chart, ..., 3].astype(np.float64)
-    )
+    heights = height_map[chart, ..., HEIGHT].astype(np.float64)
+    return np.einsum("ki,kj,kij->k", in_rows, in_columns, heights)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -103,7 +113,7 @@ def test_gpu_and_cpu_look_up_the_same_height(resources, seed):
     height_map = random_height_map(seed)
     expected = spline_sum(height_map, chart, uv)
     height = displaced(resources, vertices_at(chart, uv), height_map)[:, 2]
-    np.testing.assert_allclose(height, expected, atol=0.02)
+    np.testing.assert_allclose(height, expected, atol=0.02)  # eight bits of weight
     place = PAGE.places(chart, uv)
     # a border belongs to its own chart
     on_chart, row, column = PAGE.locate(np.minimum(place, place - 1e-9))
@@ -132,7 +142,7 @@ def test_the_height_is_the_same_from_both_charts_of_a_border(resources):
         values.append(displaced(resources, vertices, height_map, page=charts.page)[:, 2])
     np.testing.assert_allclose(values[0], values[1], atol=1e-5)
     unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    np.testing.assert_allclose(values[0], height(unit), atol=0.05)
+    np.testing.assert_allclose(values[0], height(unit), atol=0.05)  # a spline smooths the heights
 
 
 def test_vertices_move_along_their_direction_and_then_into_the_world(resources):
@@ -142,10 +152,9 @@ def test_vertices_move_along_their_direction_and_then_into_the_world(resources):
     rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     origin = np.array([0.5, -2.0, 7.0])
     height_map = np.zeros((6, N + 2, N + 2, 4), np.float32)
-    height_map[..., 3] = -0.3
-    moved = displaced(
-        resources, vertices_at(chart, uv, positions, directions), height_map, (rotation, origin, 0)
-    )
+    height_map[..., HEIGHT] = -0.3
+    vertices = vertices_at(chart, uv, positions, directions)
+    moved = displaced(resources, vertices, height_map, Place(rotation, origin))
     expected = (positions - 0.3 * directions) @ rotation.T + origin
     np.testing.assert_allclose(moved[:, :3], expected, atol=1e-5)
     np.testing.assert_array_equal(moved[:, 3], 1.0)  # nothing hides the sky
@@ -158,5 +167,7 @@ def test_only_midpoints_in_use_are_displaced(resources, used):
     vertices = vertices_at(chart, uv, midpoints=6)
     moved = displaced(resources, vertices, height_map, used=used)
     every = displaced(resources, vertices_at(chart, uv), height_map)
-    np.testing.assert_array_equal(moved[: 64 + len(used)], every[[*range(64), *used]])
-    assert np.isnan(moved[64 + len(used) :]).all()
+    own = 64  # vertices of the mesh itself
+    count = own + len(used)
+    np.testing.assert_array_equal(moved[:count], every[[*range(own), *used]])
+    assert np.isnan(moved[count:]).all()

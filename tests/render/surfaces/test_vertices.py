@@ -24,10 +24,9 @@ def test_vertices_and_midpoints_lie_on_the_ball_and_point_outwards(vertices):
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 0.5, atol=2e-3)
     outwards = position / np.linalg.norm(position, axis=1, keepdims=True)
     for columns in (surfaces.DIRECTION, surfaces.NORMAL):
-        np.testing.assert_allclose(
-            np.linalg.norm(vertices.attributes[:, columns], axis=1), 1.0, atol=1e-9
-        )
-        np.testing.assert_allclose(vertices.attributes[:, columns], outwards, atol=0.02)
+        vectors = vertices.attributes[:, columns]
+        np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1.0, atol=1e-9)
+        np.testing.assert_allclose(vectors, outwards, atol=0.02)  # a degree
     np.testing.assert_allclose(vertices.attributes[:, surfaces.BAKED][:, 0], 1.0, atol=1e-5)
 
 
@@ -60,19 +59,19 @@ def test_a_wave_over_the_edges_of_a_box_is_a_smooth_curve():
     atlas = target_atlas(model, 0, 32)
     surface = Surface(atlas.mesh.V, atlas.mesh.F, Charts.of(atlas), "clay")
     made = surfaces.surface_vertices(surface, 0.02, 40_000)
-    ends = made.edges.ends
-    along = made.attributes[ends][..., POSITION]
-    creases = np.flatnonzero(
-        (np.abs(along) > np.array([0.5, 0.4, 0.3]) - 1e-9).all(axis=1).sum(axis=1) == 2
-    )
-    texel = np.sqrt(atlas.areas.mean())
+    half_sizes = np.array([0.5, 0.4, 0.3])
+    ends = made.attributes[made.edges.ends][..., POSITION]
+    # an edge of the box lies in two of its planes, with both ends
+    in_plane = (np.abs(ends) > half_sizes - 1e-9).all(axis=1)
+    creases = ends[in_plane.sum(axis=1) == 2]
     # the box's edges from end to end, on both of their sides
-    assert np.linalg.norm(along[creases, 1] - along[creases, 0], axis=1).sum() == pytest.approx(
-        2 * 4 * 2.4
-    )
-    wave = 2 * np.pi / (8 * texel) * along[creases].sum(axis=-1)
-    # the phase of the wave whose crest is in an edge's middle
-    departure = 1 - np.cos((wave[:, 1] - wave[:, 0]) / 2)
+    lengths = np.linalg.norm(creases[:, 1] - creases[:, 0], axis=1)
+    assert lengths.sum() == pytest.approx(2 * 4 * 2 * half_sizes.sum())
+    texel = np.sqrt(atlas.areas.mean())
+    wave_number = 2 * np.pi / (8 * texel)
+    phase = wave_number * creases.sum(axis=-1)
+    # under a wave whose crest is in the middle of the edge
+    departure = 1 - np.cos((phase[:, 1] - phase[:, 0]) / 2)
     assert departure.max() < 0.02
 
 
@@ -100,8 +99,10 @@ def test_a_cut_ball_stays_round_and_shared_corners_have_identical_normals():
     parts, V, normals = parts_of(trimesh.creation.icosphere(subdivisions=2))
     assert np.linalg.norm(parts.V, axis=1).min() < 0.983
     assert np.abs(np.linalg.norm(V, axis=1) - 1).max() < 2e-3
-    radial = V[parts.F] / np.linalg.norm(V[parts.F], axis=2, keepdims=True)
-    assert np.einsum("fcj,fcj->fc", normals, radial).min() > np.cos(np.radians(1.0))
+    corners = V[parts.F]
+    radial = corners / np.linalg.norm(corners, axis=2, keepdims=True)
+    cosines = np.einsum("fcj,fcj->fc", normals, radial)
+    assert cosines.min() > np.cos(np.radians(1.0))
     _, vertex = np.unique(parts.F, return_inverse=True)
     distinct = np.unique(np.column_stack([vertex.ravel(), normals.reshape(-1, 3)]), axis=0)
     assert len(distinct) == len(parts.V)
