@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from mujoco_flags import FLAGS
 
 from ripple_sim import Material, RippleError, Ripples
 
@@ -55,37 +56,6 @@ JACOBIANS = ("dense", "sparse", "auto")
 CONES = ("pyramidal", "elliptic")
 # RK4 is refused; "discrete" came with MuJoCo 3.17, and does not take PGS
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
-# those that do not change what a scene is about, as far as this MuJoCo has them
-FLAGS = [
-    flag
-    for flag in (
-        "equality",
-        "frictionloss",
-        "limit",
-        "damper",
-        "spring",
-        "clampctrl",
-        "warmstart",
-        "filterparent",
-        "actuation",
-        "refsafe",
-        "sensor",
-        "midphase",
-        "eulerdamp",
-        "autoreset",
-        "nativeccd",
-        "island",
-        "multiccd",
-        "override",
-        "energy",
-        "fwdinv",
-        "invdiscrete",
-        "sleep",
-        "diagexact",
-    )
-    if hasattr(mujoco.mjtEnableBit, f"mjENBL_{flag.upper()}")
-    or hasattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}")
-]
 
 
 def random_options(rng: np.random.Generator) -> tuple[str, str]:
