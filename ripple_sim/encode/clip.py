@@ -19,13 +19,16 @@ from .replace import MARK
 # renderer needs the processor too.
 THREADS = 2
 
-# samples a second of the sound [1/s]
+# Samples of the sound in a second [1/s].
 SOUND_RATE = 48_000
 
-# codec of the sound by container; it gets 192 kbit/s
+# Codec of the sound, by container.
 _AUDIO_CODECS = {"mp4": "aac", "webm": "libopus"}
 
-# samples that are encoded together, 20 ms
+# Rate of the encoded sound [bit/s].
+_AUDIO_BIT_RATE = 192_000
+
+# Samples that are encoded together: 20 ms.
 _BLOCK_SAMPLES = 960
 
 
@@ -58,17 +61,19 @@ class Codec:
     options: dict[str, str] = dataclasses.field(default_factory=dict)
 
 
-# What browsers play. mbtree reads beyond its arrays where a row is not a multiple of 8 macroblocks:
-# the same frames would then give another file every time.
+# What all browsers play, in a .mp4. mbtree reads beyond its arrays where a row is not a multiple of
+# 8 macroblocks: the same frames would then give another file every time.
 H264 = Codec(
     "mp4", "libx264", "yuv420p", {"crf": "17", "preset": "veryfast", "x264-params": "mbtree=0"}
 )
+# What browsers play in a .webm.
 VP9 = Codec(
     "webm",
     "libvpx-vp9",
     "yuv420p",
     {"crf": "24", "b": "0", "deadline": "good", "cpu-used": "5", "row-mt": "1"},
 )
+# For the clips of a GIF: its colours are chosen when all frames are there.
 LOSSLESS = Codec("matroska", "libx264rgb", "rgb24", {"qp": "0", "preset": "ultrafast"})
 GIF = Codec("gif", "gif", "pal8")
 
@@ -77,7 +82,7 @@ class Clip:
     """A file with one video stream, being written by PyAV."""
 
     def __init__(self, path: Path, codec: Codec, stream: Stream) -> None:
-        # colours are luma and chroma
+        # the pixel format, if its colours are luma and chroma
         self._yuv = codec.pixel_format if codec.pixel_format.startswith("yuv") else None
         self._time_base = Fraction(1, stream.fps)
         self._frames = 0
@@ -127,35 +132,37 @@ def open_container(path: Path, container: str) -> Any:
     """Open a file for writing; the same content gives the same bytes."""
     # bitexact: no random identifiers in Matroska and WebM. faststart: an MP4's index goes in front,
     # so that playback starts before the file is loaded.
-    options = {"fflags": "+bitexact", **({"movflags": "+faststart"} if container == "mp4" else {})}
+    options = {"fflags": "+bitexact"}
+    if container == "mp4":
+        options["movflags"] = "+faststart"
     opened = av.open(str(path), "w", format=container, options=options)
     opened.metadata["comment"] = MARK
     return opened
 
 
 class _Track:
-    """The sound of a file, encoded as far as its pictures are there."""
+    """The sound of a file, encoded along with its pictures."""
 
     def __init__(self, container: Any, name: str, sound: NDArray) -> None:
         self._container = container
         self._sound = sound.astype(np.float32)
-        self._done = 0
+        self._encoded = 0  # samples
         self._stream = container.add_stream(
-            _AUDIO_CODECS[name], rate=SOUND_RATE, layout="mono", bit_rate=192_000
+            _AUDIO_CODECS[name], rate=SOUND_RATE, layout="mono", bit_rate=_AUDIO_BIT_RATE
         )
 
     def encode(self, time: float) -> None:
-        """Encode all up to a time [s]."""
-        while self._done < min(time * SOUND_RATE, len(self._sound)):
-            block = self._sound[None, self._done : self._done + _BLOCK_SAMPLES]
+        """Encode the sound up to a time [s]."""
+        while self._encoded < min(time * SOUND_RATE, len(self._sound)):
+            block = self._sound[None, self._encoded : self._encoded + _BLOCK_SAMPLES]
             frame = av.AudioFrame.from_ndarray(
                 np.ascontiguousarray(block), format="fltp", layout="mono"
             )
             frame.sample_rate = SOUND_RATE
-            frame.pts = self._done
+            frame.pts = self._encoded
             frame.time_base = Fraction(1, SOUND_RATE)
             self._container.mux(self._stream.encode(frame))
-            self._done += _BLOCK_SAMPLES
+            self._encoded += _BLOCK_SAMPLES
 
     def finish(self) -> None:
         """Encode the rest."""

@@ -1,4 +1,4 @@
-"""The formats of videos: how each stores its frames in segments, and joins these to the video."""
+"""The formats of videos: how each stores its frames in segments, and joins the segments."""
 
 from __future__ import annotations
 
@@ -42,6 +42,7 @@ def _still(write: Callable[[NDArray], None]) -> SimpleNamespace:
 
 
 def _by_pillow(path: Path, **settings: Any) -> SimpleNamespace:
+    """A segment of one frame, in an image file that Pillow writes with these settings."""
     return _still(lambda frame: Image.fromarray(frame).save(path, **settings))
 
 
@@ -78,6 +79,7 @@ class Format:
 def _of_clips(
     suffix: str, codec: Codec, join: Callable[[Segments, Path, Stream], None] | None = None
 ) -> Format:
+    """A format whose segments are clips; `join_clips` joins them if no `join` is given."""
     return Format(
         suffix=suffix,
         start=lambda path, stream: Clip(path, codec, stream),

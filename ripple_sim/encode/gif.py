@@ -49,15 +49,17 @@ def join_gif(clips: Sequence[tuple[Path, int]], path: Path, stream: Stream) -> N
 
 
 def _source(graph: Graph, stream: Stream) -> Any:
-    width = stream.width
-    height = stream.height
-    form = av.VideoFormat("rgb24")
+    """The node of a graph at which the frames enter."""
     return graph.add_buffer(
-        width=width, height=height, format=form, time_base=Fraction(1, stream.fps)
+        width=stream.width,
+        height=stream.height,
+        format=av.VideoFormat("rgb24"),
+        time_base=Fraction(1, stream.fps),
     )
 
 
 def _images(clips: Sequence[tuple[Path, int]], fps: int) -> Iterator[av.VideoFrame]:
+    """The frames of all clips."""
     for clip, first in clips:
         with av.open(str(clip)) as container:
             for number, image in enumerate(container.decode(video=0)):
@@ -71,7 +73,7 @@ def _filtered(images: Iterable[av.VideoFrame], source: Any, sink: Any) -> Iterat
     """Images from a filter graph's sink, taken while images enter its source."""
     for image in itertools.chain(images, [None]):
         source.push(image)
-        # until it wants the next image, or is done
+        # until the graph wants the next image, or has given its last one
         with contextlib.suppress(av.BlockingIOError, av.EOFError):
             while True:
                 yield sink.pull()

@@ -53,8 +53,8 @@ def check_output(
     VideoError
         If the ending is unknown, the size or rate is out of range, the size is odd in a format of
         halved colour resolution, the format supports no transparency or no overlays, EXR frames are
-        not for a folder, there can be no such name, or something that was not made here stands in
-        the output's place. With `overwrite` such a file or frames are no obstacle.
+        not for a folder, the path cannot be a file name, or something that was not made here
+        stands in the output's place. With `overwrite` such a file or frames are no obstacle.
     EncodingError
         If the output cannot be written.
     """
@@ -89,9 +89,9 @@ def check_output(
             )
         highest = MAX_GIF_FPS if form == ".gif" else MAX_FPS
         if not isinstance(fps, int) or not 1 <= fps <= highest:
-            what = "a GIF's frame rate" if form == ".gif" else "frame rate"
+            rate = "a GIF's frame rate" if form == ".gif" else "frame rate"
             raise VideoError(
-                f"{what} must be a whole number from 1 to {highest} frames per second, got {fps}"
+                f"{rate} must be a whole number from 1 to {highest} frames per second, got {fps}"
             )
         _check_place(path, form, overwrite)
     except OSError as error:
@@ -129,24 +129,31 @@ def check_replaceable(path: Path, overwrite: bool) -> None:
                 "--overwrite"
             )
         return
-    strangers = [
-        each.name
-        for each in path.iterdir()
-        if not (is_plain(each) and _FRAME_PATTERN.fullmatch(each.name))
+    other_files = [
+        entry.name
+        for entry in path.iterdir()
+        if not (is_plain(entry) and _FRAME_PATTERN.fullmatch(entry.name))
     ]
-    if strangers:
+    if other_files:
         raise VideoError(
-            f"cannot write frames to {path}: it holds other files ({min(strangers)}); name a new "
+            f"cannot write frames to {path}: it holds other files ({min(other_files)}); name a new "
             "folder"
         )
-    if not overwrite and (others := [each.name for each in path.iterdir() if not made_here(each)]):
+    if overwrite:
+        return
+    other_frames = [entry.name for entry in path.iterdir() if not made_here(entry)]
+    if other_frames:
         raise VideoError(
             f"cannot write frames to {path}: it holds frames that were not {MARK} "
-            f"({min(others)}); name a new folder, or add --overwrite"
+            f"({min(other_frames)}); name a new folder, or add --overwrite"
         )
 
 
 def _check_place(path: Path, form: str, overwrite: bool) -> None:
+    """Check that the output can be written at its path.
+
+    Raises `VideoError` if something is in the way, and `OSError` if nothing can be written there.
+    """
     is_file = form in ENDINGS
     if path.is_dir():
         if is_file:
@@ -162,9 +169,8 @@ def _check_place(path: Path, form: str, overwrite: bool) -> None:
                 f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}"
             )
         check_replaceable(final_path(path), overwrite)
-    # A link is written through. Permission bits do not tell the truth for root or on a read-only
-    # disk; a file does.
-    with tempfile.TemporaryFile(
-        dir=next(each for each in final_path(path).parents if each.exists())
-    ):
+    # A link is written through. A file is tried, since permission bits do not tell the truth for
+    # root or on a read-only disk.
+    folder = next(parent for parent in final_path(path).parents if parent.exists())
+    with tempfile.TemporaryFile(dir=folder):
         pass

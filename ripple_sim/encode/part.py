@@ -24,10 +24,12 @@ SETTINGS = "settings.json"
 STATES = "states.txt"
 _FRAMES = "frames"
 _WHOLE = "whole"
-# the semicolon is missing where a killed process cut the line off
+# A line of the states: a frame and its fingerprint. The semicolon is missing where a killed process
+# cut the line off.
 _STATE = re.compile(r"([0-9]{1,9}) ([0-9a-f]+);")
+# Name of a segment: its first frame, and its last one.
 _SEGMENT = re.compile(r"frames?_(\d+)(?:-(\d+))?")
-# what decides the content of a file, by the names in messages
+# What decides the content of a video, by the names in messages.
 Settings = Mapping[str, str | int | float]
 
 
@@ -102,29 +104,41 @@ class Part:
                 self._compare({MARK: True, **settings})
                 self._drop_unfinished()
             else:
-                # first: without it nothing is continued
-                (self.folder / SETTINGS).unlink(missing_ok=True)
-                for entry in self.folder.iterdir():
-                    shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
-                self._segments.mkdir()
-                unfinished = self.folder / f".{SETTINGS}"
-                unfinished.write_text(json.dumps({MARK: True, **settings}, indent=1))
-                # last: while it is missing there is nothing to continue
-                move(unfinished, self.folder / SETTINGS)
-            states = self.folder / STATES
-            lines = states.read_text(errors="replace").splitlines() if states.exists() else []
-            # fingerprints of the simulation that were recorded, by frame
-            self._states = {
-                int(line[1]): line[2] for line in map(_STATE.fullmatch, lines) if line is not None
-            }
+                self._begin_anew({MARK: True, **settings})
+            self._states = self._recorded_states()
         except BaseException:
             os.close(self._lock)
             raise
         self.segments: list[tuple[Path, int]] = []
         self.frames = 0
+        self._find_segments()
+
+    def _begin_anew(self, settings: Settings) -> None:
+        """Empty the folder, and write the settings into it."""
+        # first: without the settings nothing is continued
+        (self.folder / SETTINGS).unlink(missing_ok=True)
+        for entry in self.folder.iterdir():
+            shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+        self._segments.mkdir()
+        unfinished = self.folder / f".{SETTINGS}"
+        unfinished.write_text(json.dumps(settings, indent=1))
+        # last: while the settings are missing there is nothing to continue
+        move(unfinished, self.folder / SETTINGS)
+
+    def _recorded_states(self) -> dict[int, str]:
+        """Fingerprints of the simulation that were recorded, by frame."""
+        states = self.folder / STATES
+        if not states.exists():
+            return {}
+        lines = states.read_text(errors="replace").splitlines()
+        matches = [_STATE.fullmatch(line) for line in lines]
+        return {int(match[1]): match[2] for match in matches if match is not None}
+
+    def _find_segments(self) -> None:
+        """Take up the segments that earlier writers have stored."""
         for path in sorted(self._segments.iterdir(), key=lambda path: (len(path.name), path.name)):
             numbers = _SEGMENT.fullmatch(path.stem)
-            # what comes after a gap is made again
+            # the segments after a gap are made again
             if numbers is not None and int(numbers[1]) == self.frames:
                 self.segments.append((path, self.frames))
                 self.frames = int(numbers[2] or numbers[1]) + 1
@@ -198,15 +212,14 @@ class Part:
         old = json.loads((self.folder / SETTINGS).read_text())
         new = json.loads(json.dumps(settings))
         for name in sorted({*old, *new}):
-            before = old.get(name)
-            now = new.get(name)
-            if before != now:
+            if old.get(name) != new.get(name):
                 raise VideoError(
-                    f"cannot resume {self.video}: {name} was {before} and now is {now}; restore "
-                    "it, or leave --resume out to start again"
+                    f"cannot resume {self.video}: {name} was {old.get(name)} and now is "
+                    f"{new.get(name)}; restore it, or leave --resume out to start again"
                 )
 
     def _claim(self) -> None:
+        """Lock the folder, and make sure that it holds no other files."""
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
@@ -214,27 +227,38 @@ class Part:
                 f"another process is writing {self.video}; wait until it is done, or name another "
                 "file"
             ) from error
-        if strangers := sorted(self._strangers()):
+        other_files = sorted(self._other_files())
+        if other_files:
             raise VideoError(
                 f"cannot write {self.video}: its folder {self.folder.name} holds other files "
-                f"({strangers[0]}); move it away, or name another file"
+                f"({other_files[0]}); move it away, or name another file"
             )
 
-    def _strangers(self) -> Iterator[str]:
-        """Names of foreign files, in the folder and in the folder of the segments."""
-        ours = MARK in read_object(self.folder / SETTINGS)
+    def _other_files(self) -> Iterator[str]:
+        """Names of files that were not made here, in the folder and in that of the segments."""
+        has_our_settings = MARK in read_object(self.folder / SETTINGS)
         for entry in self.folder.iterdir():
-            own = is_plain(entry) and entry.name.lstrip(".") in (SETTINGS, STATES, _WHOLE)
             if entry.name == _FRAMES and entry.is_dir() and not entry.is_symlink():
-                for each in entry.iterdir():
-                    segment = _SEGMENT.fullmatch(each.stem) is not None and (
-                        ours or made_here(each)
-                    )
-                    if not (is_plain(each) and (segment or each.name.startswith(".unfinished."))):
-                        yield f"{_FRAMES}/{each.name}"
-            elif not own or (entry.name == SETTINGS and not ours):
+                for file in entry.iterdir():
+                    if not _is_segment(file, has_our_settings):
+                        yield f"{_FRAMES}/{file.name}"
+                continue
+            is_ours = is_plain(entry) and entry.name.lstrip(".") in (SETTINGS, STATES, _WHOLE)
+            if not is_ours or (entry.name == SETTINGS and not has_our_settings):
                 yield entry.name
 
     def _drop_unfinished(self) -> None:
         self.unfinished.unlink(missing_ok=True)
         self.whole.unlink(missing_ok=True)
+
+
+def _is_segment(file: Path, has_our_settings: bool) -> bool:
+    """Whether a file in the folder of the segments is a segment, complete or unfinished.
+
+    Segments beside settings of ours are ours; otherwise they must carry the mark.
+    """
+    if not is_plain(file):
+        return False
+    if file.name.startswith(".unfinished."):
+        return True
+    return _SEGMENT.fullmatch(file.stem) is not None and (has_our_settings or made_here(file))

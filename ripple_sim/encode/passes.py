@@ -20,9 +20,10 @@ from .replace import MARK, check_folder, made_here, read_object
 PASSES = ("depth", "normal", "segmentation", "flow", "position", "height")
 PASS_FORMATS = ("npz", "exr")
 
-# file that says whose passes a folder holds, and what the numbers of the segmentation mean
+# File that says whose passes a folder holds, and what the numbers of the segmentation mean.
 _CONTENTS = "segmentation.json"
 
+# Names of the files in a folder of passes.
 _NAME = re.compile(rf"passes_\d{{5,}}\.({'|'.join(PASS_FORMATS)})|{re.escape(_CONTENTS)}")
 
 # Channels of a pass in an EXR file. A pass with one channel gives it its own name.
@@ -77,15 +78,17 @@ class PassFiles:
         `EncodingError` if it cannot be written.
         """
         _check_folder(self._video, self._overwrite)  # again: to set up a scene takes long
-        kept = {self._path(frame) for frame in range(self.complete)}
-        owner = {"software": MARK, "video": final_path(self._video).name}
-        text = json.dumps(
-            {**owner, "geoms": {str(k): name for k, name in self._geoms.items()}}, indent=1
-        )
+        complete = {self._path(frame) for frame in range(self.complete)}
+        contents = {
+            "software": MARK,
+            "video": final_path(self._video).name,
+            "geoms": {str(number): name for number, name in self._geoms.items()},
+        }
+        text = json.dumps(contents, indent=1)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            for each in {*self.folder.iterdir()} - kept:
-                each.unlink()
+            for file in {*self.folder.iterdir()} - complete:
+                file.unlink()
         except OSError as error:
             raise self._error(error) from error
         self._write(self.folder / _CONTENTS, lambda path: path.write_text(text, encoding="utf-8"))
@@ -145,13 +148,13 @@ def _check_folder(video: Path, overwrite: bool) -> None:
     """
     folder = passes_folder(video)
 
-    def own(file: Path) -> bool:
-        unfinished = file.name.startswith(".")  # a kill left it, perhaps without its mark
-        return _NAME.fullmatch(file.name.lstrip(".")) is not None and (
-            unfinished or overwrite or made_here(file)
-        )
+    def is_ours(file: Path) -> bool:
+        if _NAME.fullmatch(file.name.lstrip(".")) is None:
+            return False
+        is_unfinished = file.name.startswith(".")  # a kill left it, perhaps without its mark
+        return is_unfinished or overwrite or made_here(file)
 
-    check_folder(VideoError, "passes", folder, own)
+    check_folder(VideoError, "passes", folder, is_ours)
     # None: the folder does not say whose it is
     owner = read_object(folder / _CONTENTS).get("video")
     if owner not in (None, final_path(video).name) and not overwrite:

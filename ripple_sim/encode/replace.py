@@ -13,24 +13,24 @@ from PIL.PngImagePlugin import PngInfo
 
 MARK = "made by ripple-sim"
 
-# [bytes]: the mark is in this much of a file's beginning, or in this much of its end
+# The mark is in the first or in the last so many bytes of a file.
 _HEAD_SIZE = 1 << 16
 _TAIL_SIZE = 1 << 10
 
-# [bytes]: likewise of an MP4, which has it behind its index; the index grows with the video
+# An MP4 has the mark behind its index, which grows with the video: so many bytes of it are read.
 _MP4_HEAD_SIZE = 1 << 24
 
 
 def made_here(path: Path) -> bool:
     """Whether a path is a regular file that was written here, or an empty one."""
-    found = path.lstat()
-    if not stat.S_ISREG(found.st_mode):
+    status = path.lstat()
+    if not stat.S_ISREG(status.st_mode):
         return False
-    if found.st_size == 0:
+    if status.st_size == 0:
         return True
     with path.open("rb") as file:
         head = file.read(_MP4_HEAD_SIZE if path.suffix.lower() == ".mp4" else _HEAD_SIZE)
-        file.seek(max(0, found.st_size - _TAIL_SIZE), os.SEEK_SET)
+        file.seek(max(0, status.st_size - _TAIL_SIZE), os.SEEK_SET)
         return MARK.encode() in head + file.read()
 
 
@@ -42,14 +42,11 @@ def is_plain(path: Path) -> bool:
 def read_object(path: Path) -> dict[str, Any]:
     """The object in a JSON file; empty if the file is missing, damaged, special or no object."""
     try:
-        found = json.loads(path.read_text()) if path.is_file() else None
-    except (
-        OSError,
-        ValueError,
-        RecursionError,
-    ):  # RecursionError: brackets in brackets without end
+        content = json.loads(path.read_text()) if path.is_file() else None
+    # RecursionError: brackets in brackets without end
+    except (OSError, ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return content if isinstance(content, dict) else {}
 
 
 def png_mark() -> PngInfo:
@@ -68,18 +65,27 @@ def mark_gif(path: Path) -> None:
 
 
 def check_folder(
-    kind: type[Exception], what: str, folder: Path, own: Callable[[Path], object]
+    error: type[Exception], content: str, folder: Path, is_ours: Callable[[Path], object]
 ) -> None:
-    """Check that a folder, to which `what` will be written, holds only files made here.
+    """Check that a folder holds only files that were made here, and so may be replaced.
 
-    Raises an error of type `kind` otherwise.
+    Parameters
+    ----------
+    error : type
+        Of the exception that is raised if the folder holds anything else.
+    content : str
+        What will be written to the folder, for the message.
+    folder : Path
+        It may be missing.
+    is_ours : callable
+        Whether a plain file was made here.
     """
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise kind(f"cannot write {what} to {folder}: it is not a folder; name another output")
-    for each in folder.iterdir() if folder.is_dir() else ():
-        if not (is_plain(each) and own(each)):
-            raise kind(
-                f"cannot write {what} to {folder}: it holds other files ({each.name}); name "
+        raise error(f"cannot write {content} to {folder}: it is not a folder; name another output")
+    for entry in folder.iterdir() if folder.is_dir() else ():
+        if not (is_plain(entry) and is_ours(entry)):
+            raise error(
+                f"cannot write {content} to {folder}: it holds other files ({entry.name}); name "
                 "another output"
             )
 

@@ -19,6 +19,9 @@ _ANIMATION = 0x02
 _METADATA = 0x04
 _OPACITY = 0x10
 
+# Where the first chunk of a file begins [bytes]: after "RIFF", the size and "WEBP".
+_FIRST_CHUNK = 12
+
 # flag of an ANMF chunk: the frame replaces the previous one
 _DO_NOT_BLEND = 0x02
 
@@ -33,7 +36,7 @@ def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
     canvas = b"".join((side - 1).to_bytes(3, "little") for side in (stream.width, stream.height))
     with path.open("wb") as file:
         # room for RIFF and VP8X: they are written last, with the size and the flags
-        file.write(bytes(12 + 8 + 10))
+        file.write(bytes(_FIRST_CHUNK + 8 + 10))
         file.write(riff_chunk(b"ANIM", struct.pack("<IH", 0, 0)))
         for number, still in enumerate(stills):
             # whole milliseconds, without accumulating the rounding error
@@ -56,15 +59,15 @@ def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
 
 def _image_chunks(still: bytes) -> bytes:
     """The chunks of a still WebP that make up its image."""
-    at = 12
-    kept = b""
+    at = _FIRST_CHUNK
+    image = b""
     while at < len(still):
         name, size = struct.unpack_from("<4sI", still, at)
         end = at + 8 + size + size % 2
         if name in (b"ALPH", b"VP8 ", b"VP8L"):
-            kept += still[at:end]
+            image += still[at:end]
         at = end
-    return kept
+    return image
 
 
 def riff_chunk(name: bytes, content: bytes) -> bytes:

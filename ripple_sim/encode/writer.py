@@ -166,11 +166,14 @@ class FrameWriter:
             return
         self._abandoned = True
         self._stop()
-        if not self._finished and (kept := self._part.keep()):
-            error.add_note(kept)
+        note = "" if self._finished else self._part.keep()
+        if note:
+            error.add_note(note)
 
     def _raise_error(self) -> None:
-        if (error := self._error) is not None:
+        """Raise what made encoding fail, if anything did."""
+        error = self._error
+        if error is not None:
             reason = getattr(error, "strerror", None) or error
             raise EncodingError(f"cannot write the video {self.path}: {reason}") from error
 
@@ -206,6 +209,7 @@ class FrameWriter:
                 self._segment.close()
 
     def _add(self, frame: NDArray) -> None:
+        """Add a frame to its segment, and store the segment if it is complete."""
         if self._segment is None:
             self._segment = self._format.start(self._part.unfinished, self._stream)
         self._segment.write(frame)
@@ -214,6 +218,7 @@ class FrameWriter:
             self._store()
 
     def _store(self) -> None:
+        """Store the frames of the present segment, if there are any."""
         if self._segment is not None:
             self._segment.finish()
             self._part.store(self._pending)
@@ -221,6 +226,7 @@ class FrameWriter:
             self._pending = 0
 
     def _finish(self) -> None:
+        """Join the segments, and put the video in its place."""
         self._store()
         if self._format.join is not None:
             stream = dataclasses.replace(self._stream, sound=self.sound)
