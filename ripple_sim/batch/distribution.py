@@ -58,25 +58,28 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
         Floats are rounded to 12 digits, so that no processor's last bit counts.
         """
         if self.choice is not None:
-            share = (
-                None if self.weights is None else np.divide(self.weights, math.fsum(self.weights))
-            )
-            return self.choice[int(rng.choice(len(self.choice), p=share))]
+            probabilities = None
+            if self.weights is not None:
+                probabilities = np.divide(self.weights, math.fsum(self.weights))
+            return self.choice[int(rng.choice(len(self.choice), p=probabilities))]
         if self.constant is not None:
             return self.constant
         if self.orientation:
-            turn = rng.standard_normal(4)
-            return _plain(turn / math.sqrt(math.fsum(turn**2)))
+            quaternion = rng.standard_normal(4)
+            return _plain(quaternion / math.sqrt(math.fsum(quaternion**2)))
         if self.integers is not None:
-            whole = rng.integers(
-                self.integers[0], self.integers[1], size=self.length, endpoint=True
-            )
-            return whole.tolist() if self.length else int(whole)
+            low, high = self.integers
+            integers = rng.integers(low, high, size=self.length, endpoint=True)
+            return integers.tolist() if self.length else int(integers)
         if self.uniform is not None:
             return _plain(rng.uniform(*self.uniform, size=self.length))
         if self.log_uniform is not None:
-            low, high = (np.log(np.array(end)) for end in self.log_uniform)
-            return _plain(np.exp(rng.uniform(low, high, size=self.length)))
+            log_low, log_high = (np.log(np.array(limit)) for limit in self.log_uniform)
+            return _plain(np.exp(rng.uniform(log_low, log_high, size=self.length)))
+        return self._draw_normal(rng)
+
+    def _draw_normal(self, rng: np.random.Generator) -> Any:
+        """Draw normal numbers, again and again until they lie within the limits."""
         mean, deviation = self.normal or (0.0, 0.0)
         least, greatest = self.limits or (-math.inf, math.inf)
         number = rng.normal(mean, deviation, size=self.length)
@@ -94,19 +97,17 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
 
         Raises `SceneError` with the key.
         """
-        given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
-        if len(given) != 1:
+        kinds = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
+        if len(kinds) != 1:
             raise SceneError(
                 f"plan: {key} must be drawn from one of {', '.join(KINDS)}, got "
-                f"{' and '.join(given) or 'nothing'}"
+                f"{' and '.join(kinds) or 'nothing'}"
             )
-        kind = given[0]
-        for other, extra, fitting in (
-            ("weights", self.weights, "choice"),
-            ("limits", self.limits, "normal"),
-        ):
-            if extra is not None and kind != fitting:
-                raise SceneError(f"plan: {key} has {other}, which {kind} does not take")
+        kind = kinds[0]
+        if self.weights is not None and kind != "choice":
+            raise SceneError(f"plan: {key} has weights, which {kind} does not take")
+        if self.limits is not None and kind != "normal":
+            raise SceneError(f"plan: {key} has limits, which {kind} does not take")
         if self.length is not None and (self.length < 1 or kind not in KINDS[:4]):
             raise SceneError(
                 f"plan: the length of {key} must be 1 or more, and its values numbers, got "
@@ -119,36 +120,50 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
             )
 
     def _problem(self) -> str | None:
-        """The rule that the numbers break, in words; None if they break none."""
+        """The rule that the values break, in words; None if they break none."""
+        return self._problem_of_limits() or self._problem_of_normal() or self._problem_of_choice()
+
+    def _problem_of_limits(self) -> str | None:
+        """The rule that the lowest and highest numbers break, if any."""
         pair = self.uniform or self.log_uniform or self.integers or self.limits
-        if pair is not None:
-            low = np.array(pair[0], float)
-            high = np.array(pair[1], float)
-            if low.shape not in ((), high.shape) and high.shape != ():
-                return "it must be two numbers, or two vectors of the same length"
-            if not (np.isfinite(low).all() and np.isfinite(high).all() and np.all(low <= high)):
-                return "it must be two finite numbers, the lower one first"
-            if self.log_uniform and np.any(low <= 0):
-                return "its numbers must be above 0"
-            if self.length is not None and max(low.size, high.size) > 1:
-                return "vectors have their own length; leave `length` out"
-        if self.normal is not None and not (np.isfinite(self.normal).all() and self.normal[1] >= 0):
-            return "it must be a mean and a standard deviation of 0 or more"
-        if self.choice is not None:
-            if not self.choice:
-                return "it must have at least one value"
-            weights = self.weights
-            if weights is not None and not (
-                len(weights) == len(self.choice)
-                and min(weights) >= 0
-                and 0 < sum(weights) < math.inf
-            ):
-                return f"it must have {len(self.choice)} weights, none below 0"
+        if pair is None:
+            return None
+        low = np.array(pair[0], float)
+        high = np.array(pair[1], float)
+        if low.shape not in ((), high.shape) and high.shape != ():
+            return "it must be two numbers, or two vectors of the same length"
+        if not (np.isfinite(low).all() and np.isfinite(high).all() and np.all(low <= high)):
+            return "it must be two finite numbers, the lower one first"
+        if self.log_uniform and np.any(low <= 0):
+            return "its numbers must be above 0"
+        if self.length is not None and max(low.size, high.size) > 1:
+            return "vectors have their own length; leave `length` out"
         return None
+
+    def _problem_of_normal(self) -> str | None:
+        """The rule that mean and deviation break, if any."""
+        if self.normal is None:
+            return None
+        if np.isfinite(self.normal).all() and self.normal[1] >= 0:
+            return None
+        return "it must be a mean and a standard deviation of 0 or more"
+
+    def _problem_of_choice(self) -> str | None:
+        """The rule that choices and weights break, if any."""
+        if self.choice is None:
+            return None
+        if not self.choice:
+            return "it must have at least one value"
+        if self.weights is None:
+            return None
+        has_all_weights = len(self.weights) == len(self.choice)
+        if has_all_weights and min(self.weights) >= 0 and 0 < sum(self.weights) < math.inf:
+            return None
+        return f"it must have {len(self.choice)} weights, none below 0"
 
 
 def _plain(value: Any) -> Any:
-    """Numbers of numpy as Python's, with 12 digits."""
+    """Numbers of NumPy as Python's, with 12 digits."""
     if np.ndim(value):
         return [float(f"{number:.12g}") for number in value]
     return float(f"{value:.12g}")

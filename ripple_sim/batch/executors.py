@@ -28,11 +28,15 @@ from ripple_sim.errors import BatchError
 from ripple_sim.solver.cores import available_cores
 from ripple_sim.solver.errors import shown, user_line, work_for
 
-# Two tasks for each Dask thread, so that no thread waits for its next task.
+# Tasks for each Dask thread: with two, no thread waits for its next task.
 _TASKS_PER_THREAD = 2
 
-# [s]: time between two counts of the threads of a Dask cluster
+# Time between two counts of the threads of a Dask cluster [s]: its scheduler takes a while to
+# answer.
 _COUNT_INTERVAL = 2.0
+
+# Time that a Dask scheduler has to answer at first [s].
+_ANSWER_TIME = 20
 
 
 class DaskExecutor(Executor):
@@ -57,7 +61,7 @@ class DaskExecutor(Executor):
                 "--dask needs Dask; install it with: pip install 'ripple-sim[dask]'"
             ) from error
         try:
-            self._client = Client(address, timeout=20, set_as_default=False)
+            self._client = Client(address, timeout=_ANSWER_TIME, set_as_default=False)
         except (OSError, ValueError) as error:
             raise BatchError(
                 f"no Dask scheduler answers at {shown(address)} ({error}): give an address such "
@@ -65,21 +69,20 @@ class DaskExecutor(Executor):
             ) from error
         self._address = address
         self._log = logging.getLogger("distributed.client")
-        # that the scheduler is gone is said once, by `refusal`
+        # the message of `refusal` is enough if the scheduler is gone
         self._silence = lambda record: False
         self._log.addFilter(self._silence)
         self._places = 0
-        self._counted = -math.inf
+        self._latest_count = -math.inf  # time of the latest count of threads [s]
         self._executor = self._client.get_executor(pure=False, retries=0)
 
     @property
     def places(self) -> int:
         """How many tasks may be submitted at a time."""
-        if (
-            time.monotonic() - self._counted > _COUNT_INTERVAL
-        ):  # the scheduler takes a while to answer
-            self._places = _TASKS_PER_THREAD * max(1, sum(self._client.nthreads().values()))
-            self._counted = time.monotonic()
+        if time.monotonic() - self._latest_count > _COUNT_INTERVAL:
+            threads = sum(self._client.nthreads().values())
+            self._places = _TASKS_PER_THREAD * max(1, threads)
+            self._latest_count = time.monotonic()
         return self._places
 
     def submit(self, function: Callable, /, *arguments: Any, **named: Any) -> Future:
@@ -122,26 +125,26 @@ def shares(cores: list[int], workers: int) -> list[list[int]]:
 class LocalExecutor(Executor):
     """Spawned processes, each with a core or more and an OpenGL context of its own.
 
-    One that dies fails what it was at, and is replaced; all of them end with this process, however
-    it ends. At most `places` tasks may be submitted at a time, one a worker.
+    If a process dies, its task fails, and another process replaces it. All processes end with this
+    one, however it ends. At most `places` tasks may be submitted at a time, one a process.
     """
 
     def __init__(self, workers: int) -> None:
         self.places = workers
-        self._free: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._free_places: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._cores = shares(available_cores(), workers)
         self._user_line = user_line()
-        # with the number of its process
+        # by place: a pool of one process, and the id of the process
         self._pools: dict[int, tuple[ProcessPoolExecutor, Future[int]]] = {}
         for place in range(workers):
-            self._free.put(place)
+            self._free_places.put(place)
 
     def submit(self, function: Callable, /, *arguments: Any, **named: Any) -> Future:
         """Have a function called in one of the processes; at most `places` tasks at a time."""
-        place = self._free.get_nowait()
+        place = self._free_places.get_nowait()
         try:
             future = self._pool(place).submit(function, *arguments, **named)
-        except BrokenProcessPool:  # it died while it had nothing to do
+        except BrokenProcessPool:  # the process died while it had nothing to do
             del self._pools[place]
             future = self._pool(place).submit(function, *arguments, **named)
         future.add_done_callback(functools.partial(self._release, place))
@@ -149,33 +152,37 @@ class LocalExecutor(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes; without `wait`, end them at once and drop unfinished work."""
-        for pool, process in list(self._pools.values()):
-            if not wait and process.done() and not process.exception():
+        for pool, process_id in list(self._pools.values()):
+            if not wait and process_id.done() and not process_id.exception():
                 with contextlib.suppress(ProcessLookupError):
-                    os.kill(process.result(), signal.SIGKILL)
+                    os.kill(process_id.result(), signal.SIGKILL)
             pool.shutdown(wait, cancel_futures=cancel_futures)
 
     def _pool(self, place: int) -> ProcessPoolExecutor:
+        """The process of a place, which is started at its first task."""
         if place not in self._pools:
             spawn = multiprocessing.get_context("spawn")  # OpenGL does not survive a fork
             arguments = self._cores[place], self._user_line
             pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin, initargs=arguments)
             self._pools[place] = pool, pool.submit(os.getpid)
-        return self._pools[place][0]
+        pool, _ = self._pools[place]
+        return pool
 
     def _release(self, place: int, future: Future) -> None:
+        """Free the place of a task that has ended, and give up its process if it has died."""
         if not future.cancelled() and isinstance(future.exception(), BrokenProcessPool):
-            self._pools.pop(place)[0].shutdown(wait=False)
-        self._free.put(place)
+            pool, _ = self._pools.pop(place)
+            pool.shutdown(wait=False)
+        self._free_places.put(place)
 
 
 def _begin(cores: list[int], line: tuple[str, int]) -> None:
     """Set up a worker process before it imports anything heavy.
 
-    It gets its share of the cores, and the user's line that its warnings name.
+    The process gets its share of the cores, and the user's line that its warnings name.
     """
     work_for(line)
-    # Ctrl-C goes to all processes: the parent ends this one
+    # Ctrl-C reaches all processes; the parent ends this one
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, cores)
@@ -184,11 +191,12 @@ def _begin(cores: list[int], line: tuple[str, int]) -> None:
     for variable in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, str(len(cores)))
     os.environ.setdefault("MUJOCO_GL", "disable")
-    logging.getLogger("ripple_sim").setLevel(logging.ERROR)  # the parent tells how far the batch is
+    logging.getLogger("ripple_sim").setLevel(logging.ERROR)  # the parent shows the progress
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:
+    """Wait until the parent process has ended, then end this one."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
@@ -196,14 +204,14 @@ def _end_with_parent() -> None:
 
 
 @contextlib.contextmanager
-def first_alone(work: Path, what: str) -> Iterator[None]:
-    """Run the block alone on this machine the first time that `what` is made.
+def first_alone(work: Path, task: str) -> Iterator[None]:
+    """Run the block alone on this machine the first time that a task is done.
 
-    Processes that share the folder `work` wait until the first one is done.
+    Processes that share the folder `work` wait until the first one has done it.
     """
-    ready = work / f"ready-{socket.gethostname()}-{what}"
+    ready = work / f"ready-{socket.gethostname()}-{task}"
     if not ready.exists():
-        with (work / f"first-{socket.gethostname()}-{what}").open("w") as lock:
+        with (work / f"first-{socket.gethostname()}-{task}").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             if not ready.exists():
                 yield

@@ -27,7 +27,8 @@ from ripple_sim.solver.files import atomic_write
 
 from .folder import BatchFolder, members, times_of
 
-# An array `height_TARGET` a target, [frames, C, n, n] float32, in metres, a frame a chunk.
+# Files of a finished scene. The heights hold an array `height_TARGET` for each target,
+# [frames, C, n, n] float32 [m], with a chunk for each frame.
 HEIGHTS = "heights.zarr.zip"
 
 IMPULSES = "impulses.csv"
@@ -62,29 +63,30 @@ class FinishedScene:
         """Names of the scene's files; in a tar file with dots instead of slashes."""
         if self._members is not None:
             return sorted(self._members)
-        found = sorted(
-            path.relative_to(self._path).as_posix()
-            for path in self._path.rglob("*")
-            if path.is_file()
-        )
-        return [name for name in found if name != TIMES]
+        files = [path for path in self._path.rglob("*") if path.is_file()]
+        names = sorted(path.relative_to(self._path).as_posix() for path in files)
+        return [name for name in names if name != TIMES]
 
     def read(self, name: str) -> bytes:
-        """Content of one of its files; raises `BatchError` with the names of all."""
+        """Content of one of the scene's files; raises `BatchError` with the names of all files."""
         names = self.names()
-        found = next((each for each in (name, name.replace("/", ".")) if each in names), None)
-        if found is None:
-            raise BatchError(f"scene {self.number} has no file {name!r}; it has {', '.join(names)}")
+        if name not in names:
+            name_in_tar = name.replace("/", ".")
+            if name_in_tar not in names:
+                raise BatchError(
+                    f"scene {self.number} has no file {name!r}; it has {', '.join(names)}"
+                )
+            name = name_in_tar
         with self._reported():
             if self._members is None:
-                return (self._path / found).read_bytes()
+                return (self._path / name).read_bytes()
             with self._path.open("rb") as file:
-                file.seek(self._members[found].offset_data)
-                return file.read(self._members[found].size)
+                file.seek(self._members[name].offset_data)
+                return file.read(self._members[name].size)
 
     @contextlib.contextmanager
     def _reported(self) -> Iterator[None]:
-        """Say of what cannot be read which scene it is of."""
+        """Turn errors of reading into a `BatchError` that names the scene."""
         try:
             yield
         except BatchError:
@@ -98,25 +100,23 @@ class FinishedScene:
     def facts(self) -> dict[str, Any]:
         """The facts: seed, source, values drawn, counts, energies [J], files and their hashes."""
         with self._reported():
-            found = msgspec.json.decode(self.read(FACTS), type=dict[str, Any])
-            if found["hash"] != facts_hash(
-                {name: value for name, value in found.items() if name != "hash"}
-            ):
+            facts = msgspec.json.decode(self.read(FACTS), type=dict[str, Any])
+            hashed = {name: value for name, value in facts.items() if name != "hash"}
+            if facts["hash"] != facts_hash(hashed):
                 raise ValueError(f"{FACTS} is not as it was written")
-            return found
+            return facts
 
     def times(self) -> dict[str, Any]:
-        """How long it took [s], and where it was made."""
+        """How long the scene took [s], and where it was made."""
+        is_in_tar = self._members is not None
+        path = times_of(self._path) if is_in_tar else self._path / TIMES
         with self._reported():
-            kept = (
-                self._path / TIMES if self._members is None else times_of(self._path)
-            ).read_bytes()
-            found = msgspec.json.decode(kept, type=dict[str, Any])
-            found = found if self._members is None else found[str(self.number)]
+            content = msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
+            times = content[str(self.number)] if is_in_tar else content
             return {
-                **found,
-                "seconds": float(found["seconds"]),
-                "cpu_seconds": float(found["cpu_seconds"]),
+                **times,
+                "seconds": float(times["seconds"]),
+                "cpu_seconds": float(times["cpu_seconds"]),
             }
 
     def positions(self) -> NDArray[np.float64]:
@@ -157,26 +157,22 @@ class FinishedScene:
         BatchError
             If there are none, as with EXR frames.
         """
-        images = [
-            name for name in self.names() if name.startswith("frames") and name.endswith(".png")
-        ]
-        video = next(
-            (name for name in self.names() if name.startswith("video.") and name.count(".") == 1),
-            None,
-        )
-        if not images and video is None:
+        names = self.names()
+        images = [name for name in names if name.startswith("frames") and name.endswith(".png")]
+        videos = [name for name in names if name.startswith("video.") and name.count(".") == 1]
+        if not images and not videos:
             raise BatchError(
-                f"scene {self.number} has no video and no PNG frames; it has "
-                f"{', '.join(self.names())}"
+                f"scene {self.number} has no video and no PNG frames; it has {', '.join(names)}"
             )
         with self._reported():
-            for name in images or ([video] if video and video.endswith((".gif", ".webp")) else []):
-                for frame in ImageSequence.Iterator(Image.open(io.BytesIO(self.read(name)))):
-                    yield np.asarray(frame.convert("RGB"))
-            if video and video.endswith((".mp4", ".webm")):
-                with av.open(io.BytesIO(self.read(video))) as container:
-                    for decoded in container.decode(video=0):
-                        yield decoded.to_ndarray(format="rgb24")
+            for name in images or videos[:1]:
+                if name.endswith((".mp4", ".webm")):
+                    with av.open(io.BytesIO(self.read(name))) as container:
+                        for decoded in container.decode(video=0):
+                            yield decoded.to_ndarray(format="rgb24")
+                elif name.endswith((".png", ".gif", ".webp")):
+                    for frame in ImageSequence.Iterator(Image.open(io.BytesIO(self.read(name)))):
+                        yield np.asarray(frame.convert("RGB"))
 
     def passes(self) -> Iterator[dict[str, NDArray]]:
         """The passes of each frame by their names, from .npz files.
@@ -194,20 +190,20 @@ class FinishedScene:
         with self._reported():
             for name in names:
                 with np.load(io.BytesIO(self.read(name))) as arrays:
-                    yield {each: arrays[each] for each in arrays.files}
+                    yield {pass_name: arrays[pass_name] for pass_name in arrays.files}
 
 
 def scenes_in_tar(tar: Path) -> Iterator[FinishedScene]:
     """The scenes in a tar file, in the order of their numbers."""
-    for number, found in sorted(members(tar).items()):
-        yield FinishedScene(number, tar, found)
+    for number, files in sorted(members(tar).items()):
+        yield FinishedScene(number, tar, files)
 
 
 def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[FinishedScene]:
     """The finished scenes, each once, without the scenes that are known already."""
     loose = sorted(batch.loose())
     packed: set[int] = set()
-    # looked at later than the folders, so that no scene is missed on its way into one
+    # tar files are read after the folders: a scene that moves into one meanwhile is not missed
     for tar in batch.tar_files():
         for scene in scenes_in_tar(tar):
             packed.add(scene.number)
@@ -221,10 +217,8 @@ def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[
 def pack(batch: BatchFolder, first: int, end: int) -> None:
     """Move the finished scenes from `first` up to `end` (excluded) into one tar file.
 
-    Scenes that are already in the tar file stay in it.
-
-    Killed at any time and called again, it loses and doubles nothing: folders go when the tar file
-    is there.
+    Scenes that are already in the tar file stay in it. The folders are removed when the tar file is
+    complete: a call that is killed and repeated loses no scene and packs none twice.
     """
     with (batch.work / f"tar-{first:06d}").open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process at a time
@@ -232,13 +226,15 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
         if not loose:
             return
         tar = batch.tar(first)
-        before = {each.number: each for each in scenes_in_tar(tar)} if tar.exists() else {}
-        now = {number: FinishedScene(number, batch.scene(number)) for number in loose}
-        scenes = dict(sorted((before | now).items()))
+        packed = {}
+        if tar.exists():
+            packed = {scene.number: scene for scene in scenes_in_tar(tar)}
+        new = {number: FinishedScene(number, batch.scene(number)) for number in loose}
+        scenes = dict(sorted((packed | new).items()))
         times = {str(number): scene.times() for number, scene in scenes.items()}
         with atomic_write(times_of(tar)) as path:
             path.write_bytes(msgspec.json.encode(times))
-        # it appears whole, and tells nothing of who wrote it and when
+        # the tar file appears when it is complete; its bytes do not say who wrote it and when
         with (
             atomic_write(tar) as path,
             tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as file,
@@ -250,7 +246,7 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
                     content = scene.read(name)
                     member.size = len(content)
                     file.addfile(member, io.BytesIO(content))
-        for number in loose:  # others shall see everything of a folder or nothing
+        for number in loose:  # other processes see a folder complete or not at all
             hidden = batch.work / f"packed-{number:06d}"
             shutil.rmtree(hidden, ignore_errors=True)  # of a process that was killed
             batch.scene(number).rename(hidden)

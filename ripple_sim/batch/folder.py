@@ -1,10 +1,13 @@
 """The folder of a batch: its files, the finished scenes, and the scenes being made.
 
-`plan.json` is what the scenes are made by; `scenes/000012` is a finished scene, or a member of
-`tars/000000.tar`; `work/000012` is one that is being made, locked by whoever makes it;
-`failed/000012.json` and `.log` tell what went wrong. A scene is finished when its folder is renamed
-from `work` to `scenes`: nothing else has to be kept in step. Tar files are as WebDataset reads
-them: files of one scene one after another, named by its number.
+- `plan.json`: the plan of the scenes;
+- `scenes/000012`: a finished scene; or its files are in `tars/000000.tar`;
+- `work/000012`: a scene that is being made, locked by the process that makes it;
+- `failed/000012.json` and `.log`: what went wrong with a scene.
+
+A scene is finished when its folder is renamed from `work` to `scenes`: nothing else has to be kept
+in step. WebDataset reads the tar files: the files of a scene stand one after another, and their
+names begin with its number.
 """
 
 from __future__ import annotations
@@ -12,7 +15,6 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import hashlib
-import itertools
 import os
 import re
 import shutil
@@ -32,43 +34,40 @@ from ripple_sim.video.settings import scene_digest, versions
 
 from .plan import Plan, check_plan
 
+# The number of a scene in a file name.
 NUMBER = re.compile(r"\d{6,}")
 
-# Until a scene is put aside: errors of its own, and deaths of its worker, which may have another
-# reason.
+# A scene is put aside after so many errors of its own, or after so many deaths of its worker, which
+# may have another reason.
 ERRORS = 3
 DEATHS = 9
 
 
 def times_of(tar: Path) -> Path:
-    """The file that holds the times of the scenes in a tar file.
+    """The file that says how long the scenes of a tar file took, and who made them.
 
-    It says who made each scene and how long that took. The tar file does not contain this, so that
-    its bytes do not depend on it.
+    It is not in the tar file, whose bytes must not depend on it.
     """
     return tar.with_suffix(".times.json")
 
 
 def members(tar: Path) -> dict[int, dict[str, tarfile.TarInfo]]:
     """The files in a tar file by their names, by scene; raises `BatchError` if it is damaged."""
-    found: dict[int, dict[str, tarfile.TarInfo]] = {}
+    files: dict[int, dict[str, tarfile.TarInfo]] = {}
     try:
         with tarfile.open(tar) as file:
             for member in file:
                 number, name = member.name.split(".", 1)
-                found.setdefault(int(number), {})[name] = member
+                files.setdefault(int(number), {})[name] = member
     except (tarfile.TarError, EOFError, ValueError, OSError) as error:
         raise BatchError(
             f"{tar} is damaged: {error}; remove it, and run the batch again"
         ) from error
-    return found
+    return files
 
 
 class Failure(msgspec.Struct):
-    """The failures of a scene.
-
-    It counts the scene's own errors and the deaths of its worker, and keeps the last message.
-    """
+    """The failures of a scene: its own errors, the deaths of its worker, and the last message."""
 
     errors: int = 0
     deaths: int = 0
@@ -76,7 +75,7 @@ class Failure(msgspec.Struct):
 
     @property
     def attempts(self) -> int:
-        """How often it was tried."""
+        """How often the scene was tried."""
         return self.errors + self.deaths
 
     @property
@@ -105,13 +104,13 @@ class BatchFolder:
         Raises `BatchError` if one of them is or contains a link, which would lead out of the batch.
         """
         folders = (self.scenes, self.tars, self.failed, self.thumbnails, self.work)
-        paths = itertools.chain.from_iterable(map(_entries, (self.path, *folders)))
-        for path in paths:
-            if path.is_symlink():
-                raise BatchError(
-                    f"{path} is a link, which no batch makes; remove it and run the same command "
-                    "again"
-                )
+        for folder in (self.path, *folders):
+            for path in _entries(folder):
+                if path.is_symlink():
+                    raise BatchError(
+                        f"{path} is a link, which no batch makes; remove it and run the same "
+                        "command again"
+                    )
         for folder in folders:
             folder.mkdir(parents=True, exist_ok=True)
 
@@ -124,8 +123,8 @@ class BatchFolder:
         return self.thumbnails / f"{number:06d}.jpg"
 
     def finished(self) -> set[int]:
-        """Numbers of the scenes that are there."""
-        # in this order: scenes move into tar files
+        """Numbers of the finished scenes."""
+        # the folders first: scenes move into tar files meanwhile
         return self.loose().union(*map(members, self.tar_files()))
 
     def loose(self) -> set[int]:
@@ -133,10 +132,10 @@ class BatchFolder:
         return {int(path.name) for path in _entries(self.scenes) if NUMBER.fullmatch(path.name)}
 
     def is_finished(self, number: int) -> bool:
-        """Whether a scene is there."""
+        """Whether a scene is finished."""
         if self.scene(number).exists():
             return True
-        # named by their first scene
+        # tar files have the numbers of their first scenes
         tars = [tar for tar in self.tar_files() if int(tar.stem) <= number]
         return bool(tars) and number in members(tars[-1])
 
@@ -161,14 +160,14 @@ class BatchFolder:
         work.mkdir(parents=True, exist_ok=True)
         handle = os.open(work, os.O_RDONLY | os.O_NOFOLLOW)
         try:
-            mine = False
-            with contextlib.suppress(BlockingIOError):
+            is_claimed = False
+            with contextlib.suppress(BlockingIOError):  # another process makes the scene
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                mine = not self.is_finished(number)
-                if not mine:  # but finished by another process, meanwhile
-                    with contextlib.suppress(OSError):  # it is not empty
+                is_claimed = not self.is_finished(number)
+                if not is_claimed:
+                    with contextlib.suppress(OSError):  # the folder is not empty
                         work.rmdir()
-            yield work if mine else None
+            yield work if is_claimed else None
         finally:
             os.close(handle)
 
@@ -180,12 +179,13 @@ class BatchFolder:
 
     def failures(self) -> dict[int, Failure]:
         """The scenes that have failed, also those that may yet succeed."""
-        found = {}
+        failures = {}
         for path in _entries(self.failed):
             if path.suffix == ".json" and NUMBER.fullmatch(path.stem):
                 with contextlib.suppress(ValueError, RecursionError):
-                    found[int(path.stem)] = msgspec.json.decode(path.read_bytes(), type=Failure)
-        return found
+                    failure = msgspec.json.decode(path.read_bytes(), type=Failure)
+                    failures[int(path.stem)] = failure
+        return failures
 
     def note_failure(self, number: int, failure: Failure, log: str) -> None:
         """Keep what went wrong with a scene."""
@@ -215,6 +215,7 @@ def clear(folder: Path) -> None:
 
 
 def _entries(folder: Path) -> list[Path]:
+    """Everything in a folder, in order; nothing if it is missing."""
     return sorted(folder.iterdir()) if folder.is_dir() else []
 
 
@@ -249,21 +250,7 @@ def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
     Raises `BatchError` naming what has changed.
     """
     if batch.plan.exists():
-        before = _flat(load_stored(batch.plan))
-        now = _flat(plan)
-        # a larger batch begins like a smaller one
-        keys = (before.keys() | now.keys()) - {"plan.count"}
-        if changed := sorted(key for key in keys if before.get(key) != now.get(key)):
-            key = changed[0]
-            more = (
-                f", and {len(changed) - 1} more ({', '.join(changed[1:4])})"
-                if len(changed) > 1
-                else ""
-            )
-            raise BatchError(
-                f"{batch.path} holds a batch by another plan: {key} was {shown(before.get(key))} "
-                f"and is {shown(now.get(key))}{more}; take it back, or name another folder"
-            )
+        _check_same_plan(batch, load_stored(batch.plan), plan)
     elif batch.path.is_dir() and any(batch.path.iterdir()):
         raise BatchError(f"{batch.path} holds other files and no batch; name a new folder")
     batch.make()
@@ -271,12 +258,33 @@ def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
         path.write_bytes(msgspec.json.format(msgspec.json.encode(plan), indent=1))
 
 
+def _check_same_plan(batch: BatchFolder, old_plan: StoredPlan, new_plan: StoredPlan) -> None:
+    """Raise `BatchError` if a plan differs from the one in the folder of its batch.
+
+    The number of scenes may differ: a larger batch begins like a smaller one.
+    """
+    old = _flat(old_plan)
+    new = _flat(new_plan)
+    keys = (old.keys() | new.keys()) - {"plan.count"}
+    changed = sorted(key for key in keys if old.get(key) != new.get(key))
+    if not changed:
+        return
+    key = changed[0]
+    others = ""
+    if len(changed) > 1:
+        others = f", and {len(changed) - 1} more ({', '.join(changed[1:4])})"
+    raise BatchError(
+        f"{batch.path} holds a batch by another plan: {key} was {shown(old.get(key))} and is "
+        f"{shown(new.get(key))}{others}; take it back, or name another folder"
+    )
+
+
 def load_stored(path: Path) -> StoredPlan:
     """Read the plan in the folder of a batch; raises `BatchError`."""
     try:
-        found = msgspec.json.decode(path.read_bytes(), type=StoredPlan)
-        check_plan(found.plan)
-        return found
+        stored_plan = msgspec.json.decode(path.read_bytes(), type=StoredPlan)
+        check_plan(stored_plan.plan)
+        return stored_plan
     # strings that are not UTF-8 are a ValueError
     except (OSError, RecursionError, ValueError, SceneError) as error:
         raise BatchError(
@@ -285,20 +293,23 @@ def load_stored(path: Path) -> StoredPlan:
 
 
 def _flat(value: Any) -> dict[str, Any]:
-    """Values of nested tables by keys with dots; files by their names, wherever the plan is."""
+    """The values of a stored plan by keys with dots.
+
+    Files are named without their folders, so that a plan may move along with its files.
+    """
     content = msgspec.to_builtins(value)
     plan = content["plan"]
     plan["sources"] = [Path(source).name for source in plan["sources"]]
     content["files"] = {Path(source).name: digest for source, digest in content["files"].items()}
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
 
-    def walk(table: dict[str, Any], before: str) -> None:
-        for key, inner in table.items():
-            name = f"{before}.{key}" if before else key
-            if isinstance(inner, dict) and before not in ("plan.vary", "plan.model"):
-                walk(inner, name)
+    def add(table: dict[str, Any], prefix: str) -> None:
+        for key, value in table.items():
+            name = f"{prefix}.{key}" if prefix else key
+            if isinstance(value, dict) and prefix not in ("plan.vary", "plan.model"):
+                add(value, name)
             else:
-                found[name] = inner
+                values[name] = value
 
-    walk(content, "")
-    return found
+    add(content, "")
+    return values

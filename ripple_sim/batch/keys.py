@@ -8,12 +8,11 @@ from fnmatch import fnmatchcase
 
 from ripple_sim.errors import SceneError
 
-# One step of a key: a name, perhaps with something in brackets behind it.
+# One step of a key: a name, perhaps with brackets behind it.
 _STEP_PATTERN = r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?"
 
-
-# A part of a key: a name, and what stands in brackets behind it: a number, a name, or a pattern
-# with *; "" without.
+# A step of a key: its name, and the text in its brackets, which is a number, a name, or a pattern
+# with *. The text is "" without brackets.
 Step = tuple[str, str]
 
 
@@ -28,21 +27,22 @@ def parse_key(key: str) -> tuple[Step, ...]:
     return tuple(re.findall(_STEP_PATTERN, key))
 
 
-def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
+def choose(names: Sequence[str], step: Step, owner: str) -> list[int]:
     """Indices of the items that a step of a key selects by their names; without brackets all.
 
-    Raises `SceneError` if there is none.
+    `owner` says in the message what has the items. Raises `SceneError` if none is selected.
     """
-    kind, chosen = step
-    if not chosen:
-        found = list(range(len(names)))
-    elif chosen.isdecimal() and chosen not in names:
-        found = [int(chosen)] if int(chosen) < len(names) else []
+    kind, selector = step
+    if not selector:
+        indices = list(range(len(names)))
+    elif selector.isdecimal() and selector not in names:
+        indices = [int(selector)] if int(selector) < len(names) else []
     else:
-        found = [number for number, name in enumerate(names) if fnmatchcase(name, chosen)]
-    if not found:
-        listed = (
-            ", ".join(name or f"number {number}" for number, name in enumerate(names)) or "none"
+        indices = [index for index, name in enumerate(names) if fnmatchcase(name, selector)]
+    if not indices:
+        labels = [name or f"number {index}" for index, name in enumerate(names)]
+        raise SceneError(
+            f"plan: {owner} has no {kind}[{selector or '*'}]; there is "
+            f"{', '.join(labels) or 'none'}"
         )
-        raise SceneError(f"plan: {where} has no {kind}[{chosen or '*'}]; there is {listed}")
-    return found
+    return indices

@@ -24,7 +24,7 @@ from ripple_sim.video.settings import check_options
 from .distribution import KINDS, Distribution
 from .keys import parse_key
 
-# largest `count` of a plan
+# Largest `count` of a plan.
 MOST_SCENES = 10_000_000
 
 
@@ -71,10 +71,9 @@ def video_name(store: StoreEntry) -> str | None:
 
 def options_of(store: StoreEntry) -> VideoOptions:
     """How the scenes of a batch are rendered."""
-    shared = {field.name for field in dataclasses.fields(VideoOptions)} & set(
-        StoreEntry.__struct_fields__
-    )
-    options = VideoOptions(**{name: getattr(store, name) for name in shared})
+    option_names = {field.name for field in dataclasses.fields(VideoOptions)}
+    shared_names = option_names & set(StoreEntry.__struct_fields__)
+    options = VideoOptions(**{name: getattr(store, name) for name in shared_names})
     return dataclasses.replace(options, frame_format="exr" if store.video == "exr" else "png")
 
 
@@ -151,9 +150,9 @@ def read_plan(path: str | Path) -> Plan:
     if path.exists() and not path.is_file():
         raise SceneError(f"plan {str(path)!r} is not a regular file; give the path of a TOML file")
     table = read_toml(path, "plan")
-    what = f"plan {str(path)!r}"
-    check_keys(table, PlanFile, what)
-    content = converted(table, PlanFile, what)
+    title = f"plan {str(path)!r}"
+    check_keys(table, PlanFile, title)
+    content = converted(table, PlanFile, title)
     plan = Plan(
         count=content.count,
         seed=content.seed,
@@ -200,12 +199,13 @@ def check_plan(plan: Plan) -> None:
         check_options(options_of(store), Path(folder) / (video_name(store) or "frames"))
     if plan.meshes is not None and isinstance(plan.meshes.bodies, Distribution):
         plan.meshes.bodies.check("meshes.bodies")
-    for key, given in (*plan.vary.items(), *plan.model.items()):
+    for key, distribution in (*plan.vary.items(), *plan.model.items()):
         parse_key(key)
-        given.check(key)
+        distribution.check(key)
 
 
 def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
+    """The sources of a plan: names of scenes, paths of scene files, and paths of meshes."""
     shipped = shipped_scenes()
     for name in content.scenes:
         path = folder / name
@@ -217,34 +217,34 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
             )
         yield name if name in shipped else str(path.resolve())
     for pattern in content.meshes.files if content.meshes else ():
-        # files that fit the pattern, and in folders the files with a mesh's ending
-        fitting = sorted(glob.glob(str(folder / pattern)))  # noqa: PTH207 - absolute ones too
-        paths = [Path(name).resolve() for name in fitting]
-        found = [path for path in paths if path.is_file()]
-        for place in filter(Path.is_dir, paths):
-            for file in sorted(place.iterdir()):
-                if file.suffix[1:].lower() in trimesh.available_formats():
-                    found.append(file)
-        if not found:
+        meshes = _meshes(folder, pattern)
+        if not meshes:
             raise SceneError(
                 f"plan: no mesh fits {pattern!r}: give a file, a folder or a pattern, relative "
                 "to the plan"
             )
-        yield from map(str, found)
+        yield from map(str, meshes)
 
 
-def _distributions(table: dict[str, Any], before: str) -> Iterator[tuple[str, Distribution]]:
+def _meshes(folder: Path, pattern: str) -> list[Path]:
+    """Files that fit a pattern, and the mesh files in folders that fit it."""
+    names = sorted(glob.glob(str(folder / pattern)))  # noqa: PTH207 - absolute ones too
+    paths = [Path(name).resolve() for name in names]
+    meshes = [path for path in paths if path.is_file()]
+    for subfolder in filter(Path.is_dir, paths):
+        for file in sorted(subfolder.iterdir()):
+            if file.suffix[1:].lower() in trimesh.available_formats():
+                meshes.append(file)
+    return meshes
+
+
+def _distributions(table: dict[str, Any], prefix: str) -> Iterator[tuple[str, Distribution]]:
     """Distributions by their keys, whether `camera.azimuth` is written with quotes or as tables."""
     for name, value in table.items():
-        key = f"{before}.{name}" if before else name
-        if isinstance(value, dict) and not set(value) & {*KINDS, "apply"}:
+        key = f"{prefix}.{name}" if prefix else name
+        is_table = isinstance(value, dict)
+        if is_table and not set(value) & {*KINDS, "apply"}:
             yield from _distributions(value, key)
             continue
-        yield (
-            key,
-            converted(
-                value if isinstance(value, dict) else {"constant": value},
-                Distribution,
-                f"plan: {key}",
-            ),
-        )
+        fields = value if is_table else {"constant": value}
+        yield key, converted(fields, Distribution, f"plan: {key}")

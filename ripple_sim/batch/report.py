@@ -18,9 +18,10 @@ from ripple_sim.solver.files import atomic_write
 from .finished import finished_scenes
 from .folder import BatchFolder, Failure, load_stored
 
-# Scenes that the page shows, at most.
+# Largest number of scenes that the page shows.
 _MAX_SHOWN_SCENES = 5_000
 
+# Beginning of the page.
 _HEAD = """<!doctype html><meta charset="utf-8"><title>{name}</title><style>
 body{{font:15px system-ui,sans-serif;margin:2rem;color:#222;background:#fafafa}}
 main{{display:grid;grid-template-columns:repeat(auto-fill,minmax(170px,1fr));gap:12px}}
@@ -44,7 +45,7 @@ _FACT_COLUMNS = (
     "hash",
 )
 
-# Failures that the status lists, at most.
+# Largest number of failures that the status lists.
 _MAX_LISTED_FAILURES = 5
 
 
@@ -54,10 +55,10 @@ def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
     frames = sum(row["frames"] for row in finished)
     size = sum(row["bytes"] for row in finished)
     seconds = sum(row["seconds"] for row in finished)
-    shown = f"; the first {_MAX_SHOWN_SCENES} are shown" if len(rows) > _MAX_SHOWN_SCENES else ""
+    limit = f"; the first {_MAX_SHOWN_SCENES} are shown" if len(rows) > _MAX_SHOWN_SCENES else ""
     summary = (
         f"{len(finished)} scenes, {frames} frames, {size / 1e6:.1f} MB, {seconds:.0f} s of work; "
-        f"{len(rows) - len(finished)} failed{shown}"
+        f"{len(rows) - len(finished)} failed{limit}"
     )
     cards = "".join(_card(batch, row) for row in rows[:_MAX_SHOWN_SCENES])
     name = html.escape(batch.path.name)
@@ -68,6 +69,7 @@ def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
 
 
 def _card(batch: BatchFolder, row: dict[str, Any]) -> str:
+    """The part of the page that shows one scene."""
     number = row["number"]
     if row["status"] != "finished":
         return (
@@ -76,11 +78,9 @@ def _card(batch: BatchFolder, row: dict[str, Any]) -> str:
         )
     title = html.escape("\n".join(f"{name}: {value}" for name, value in row.items()), quote=True)
     thumbnail = batch.thumbnail(number)
-    image = (
-        f'<img loading="lazy" src="thumbnails/{thumbnail.name}" alt="">'
-        if thumbnail.exists()
-        else ""
-    )
+    image = ""
+    if thumbnail.exists():
+        image = f'<img loading="lazy" src="thumbnails/{thumbnail.name}" alt="">'
     link = f"scenes/{number:06d}/" if batch.scene(number).exists() else "tars/"
     text = f"{number}: {html.escape(row['source'])}, {row['impulse']:.3g} N s"
     return f'<a href="{link}" title="{title}">{image}{text}</a>\n'
@@ -108,7 +108,8 @@ def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
     for scene in finished_scenes(batch, rows):
         try:
             rows[scene.number] = row(scene.facts(), scene.times())
-        except BatchError as error:  # or another process packs it, and will write the index too
+        # or another process packs the scene now, and will write the index too
+        except BatchError as error:
             damaged[scene.number] = Failure(error=str(error))
     failed: dict[int, dict[str, Any]] = {}
     for number, failure in (batch.failures() | damaged).items():
@@ -149,9 +150,9 @@ def row(facts: dict[str, Any], times: dict[str, Any]) -> dict[str, Any]:
         **{name: facts[name] for name in _FACT_COLUMNS},
         "seconds": times["seconds"],
         "cpu_seconds": times["cpu_seconds"],
-        "height_max": max(each["height_max"] for each in targets),
-        "energy_max": sum(each["energy_max"] for each in targets),
-        "energy_end": sum(each["energy_end"] for each in targets),
+        "height_max": max(target["height_max"] for target in targets),
+        "energy_max": sum(target["energy_max"] for target in targets),
+        "energy_end": sum(target["energy_end"] for target in targets),
         **facts["values"],
     }
 
@@ -215,19 +216,20 @@ def status_text(path: Path) -> str:
     batch.check()
     count = load_stored(batch.plan).plan.count
     finished = {number for number in batch.finished() if number < count}
-    failures = {number: each for number, each in batch.failures().items() if number not in finished}
-    aside = [number for number, each in failures.items() if each.aside]
+    failures = {}
+    for number, failure in sorted(batch.failures().items()):
+        if number not in finished:
+            failures[number] = failure
+    aside = [number for number, failure in failures.items() if failure.aside]
     lines = [
         f"{path}: {len(finished)} of {count} scenes finished, {len(aside)} put aside, "
         f"{count - len(finished) - len(aside)} to be made"
     ]
-    lines += [
-        (
-            f"scene {number} failed {each.attempts} times: {each.error} "
+    for number, failure in list(failures.items())[:_MAX_LISTED_FAILURES]:
+        lines.append(
+            f"scene {number} failed {failure.attempts} times: {failure.error} "
             f"({batch.failed.name}/{number:06d}.log)"
         )
-        for number, each in sorted(failures.items())[:_MAX_LISTED_FAILURES]
-    ]
     if len(failures) > _MAX_LISTED_FAILURES:
         lines.append(f"and {len(failures) - _MAX_LISTED_FAILURES} more failed")
     if aside:

@@ -1,7 +1,7 @@
-"""`run_batch`: makes the scenes of a plan that are not there yet, whoever works on them.
+"""`run_batch`: makes the missing scenes of a plan, in processes here or on other machines.
 
-A run gives out what is to be made, and notes what comes back. A trial makes one scene, and tells
-what all will take.
+A `BatchRun` submits scenes to an executor, and records their outcomes. A trial makes one scene, and
+estimates the time and the room for all.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ from .report import parquet, row, write_index
 from .variation import Variation
 from .worker import Outcome, make_scene
 
-# [s]: time between two checks of scenes that other processes make
+# Time between two checks of scenes that other processes make [s].
 _POLL_INTERVAL = 1.0
 
-# [s]: least time between two versions of the index while scenes are made
+# Least time between two versions of the index while scenes are made [s].
 _INDEX_INTERVAL = 30.0
 
 # Least time between two versions of the index, over the time to write one.
 _INDEX_REST = 20.0
 
-# scenes whose values are drawn, as a check, before the batch begins
+# Number of scenes whose values are drawn, as a check, before the batch begins.
 _CHECKED_SCENES = 3
 
-# scenes whose values a trial prints
+# Number of scenes whose values a trial prints.
 _SHOWN_SCENES = 3
 
 
@@ -68,16 +68,18 @@ class RunOptions:
 
 @dataclasses.dataclass
 class Progress:
-    """How far a batch is.
+    """The progress of a batch.
 
     Attributes
     ----------
     scenes, finished, aside : int
-        Of this run's share: all, those that are there, those that have been put aside.
+        Number of all scenes in this run's share, of its finished scenes, and of those that have
+        been put aside.
     made, frames, bytes, failures : int
-        By this run: scenes, their frames and size on the disk, and scenes that failed once or more.
+        Number of scenes that this run has made, of their frames and their bytes on the disk, and of
+        scenes that have failed once or more.
     seconds : float
-        That this run has taken so far [s].
+        Time that this run has taken so far [s].
     free : int
         Room left on the disk [bytes].
     """
@@ -94,7 +96,7 @@ class Progress:
 
 
 class BatchRun:
-    """The scenes that one process has made, and those that it still has to."""
+    """One process's run of a batch: the scenes that it still has to submit, and the outcomes."""
 
     def __init__(self, batch: BatchFolder, plan: Plan, options: RunOptions) -> None:
         self.batch = batch
@@ -108,53 +110,52 @@ class BatchRun:
         pending = [number for number in share if number not in finished and number not in aside]
         self.pending = deque(pending[: options.limit])
         self._tar_size = plan.store.scenes_per_tar if plan.store.format == "webdataset" else 0
-        self._open = (
-            Counter(number // self._tar_size for number in pending) if self._tar_size else Counter()
-        )
+        # missing scenes of each tar file, by the number of the tar file
+        self._missing: Counter[int] = Counter()
+        if self._tar_size:
+            self._missing.update(number // self._tar_size for number in pending)
         self.progress = Progress(
-            len(share), len(finished.intersection(share)), len(aside.intersection(share))
+            scenes=len(share),
+            finished=len(finished.intersection(share)),
+            aside=len(aside.intersection(share)),
         )
-        self.full: str | None = None
+        self.full: str | None = None  # why the run ends early: the disk is full
         self._done: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
         self._running: set[int] = set()
-        self._later: list[int] = []  # what other processes are at
+        self._busy: list[int] = []  # scenes that other processes make
 
     def work(
         self, executor: LocalExecutor | DaskExecutor, progress: Callable[[Progress], None] | None
     ) -> None:
         """Have all scenes made."""
-        start = indexed = time.monotonic()
-        pause = _INDEX_INTERVAL
-        if self._tar_size:  # those that were not packed before a kill
-            for number in {number // self._tar_size for number in self.batch.loose() & self._share}:
-                self._pack(number)
-        while self.pending or self._running or self._later:
+        start = time.monotonic()
+        next_index = start + _INDEX_INTERVAL
+        if self._tar_size:  # scenes that were not packed before a kill
+            loose = self.batch.loose() & self._share
+            for group in {number // self._tar_size for number in loose}:
+                self._pack(group)
+        while self.pending or self._running or self._busy:
             self._submit(executor)
             with contextlib.suppress(queue.Empty):
                 number, future = self._done.get(timeout=_POLL_INTERVAL)
                 self._running.remove(number)
-                try:
-                    outcome = future.result()
-                except Exception as error:  # the worker died
-                    outcome = Outcome(
-                        number, "died", error=f"its worker died: {' '.join(str(error).split())}"
-                    )
-                self._take(number, outcome)
-            if not self.pending and not self._running and self._later and self.full is None:
+                self._record(number, _outcome(number, future))
+            if not self.pending and not self._running and self._busy and self.full is None:
                 time.sleep(_POLL_INTERVAL)
-                self.pending = deque(self._later)
-                self._later = []
+                self.pending = deque(self._busy)
+                self._busy = []
             self.progress.seconds = time.monotonic() - start
             if progress is not None:
                 progress(self.progress)
-            if time.monotonic() - indexed > pause:
-                before = time.monotonic()
+            if time.monotonic() > next_index:
+                index_start = time.monotonic()
                 write_index(self.batch, self.rows)
-                indexed = time.monotonic()
-                pause = max(_INDEX_INTERVAL, _INDEX_REST * (indexed - before))
+                index_end = time.monotonic()
+                pause = max(_INDEX_INTERVAL, _INDEX_REST * (index_end - index_start))
+                next_index = index_end + pause
 
     def _submit(self, executor: LocalExecutor | DaskExecutor) -> None:
-        """Give out scenes while there is a place for one, and room on the disk."""
+        """Submit scenes while the executor has places, and the disk has room."""
         self.progress.free = shutil.disk_usage(self.batch.path).free
         if self.progress.free < self.options.keep_free and self.full is None:
             self.full = (
@@ -163,7 +164,7 @@ class BatchRun:
             )
         if self.full is not None:
             self.pending.clear()
-            self._later.clear()
+            self._busy.clear()
         while self.pending and len(self._running) < executor.places:
             number = self.pending.popleft()
             self._running.add(number)
@@ -172,50 +173,73 @@ class BatchRun:
                 lambda future, number=number: self._done.put((number, future))  # type: ignore[misc]
             )
 
-    def _take(self, number: int, outcome: Outcome) -> None:
+    def _record(self, number: int, outcome: Outcome) -> None:
+        """Record the outcome of a scene."""
         if outcome.state == "busy":
-            self._later.append(number)
+            self._busy.append(number)
         elif outcome.state == "full":
             self.full = f"the disk is full: {outcome.error}"
         elif outcome.state in ("failed", "died"):
-            before = self.failures.get(number, Failure())
-            died = outcome.state == "died"
-            failure = Failure(before.errors + (not died), before.deaths + died, outcome.error)
-            self.progress.failures += before.attempts == 0
-            self.failures[number] = failure
-            self.batch.note_failure(number, failure, outcome.log)
-            if not failure.aside:
-                self.pending.append(number)  # again, after all others
-            else:
-                self.progress.aside += 1
-                self._close(number)
+            self._record_failure(number, outcome)
         else:
-            self.progress.finished += 1
-            if outcome.state == "made":
-                self.progress.made += 1
-                self.progress.frames += outcome.row["frames"]
-                self.progress.bytes += outcome.row["bytes"]
-                self.rows[number] = row(outcome.row, outcome.times)
-            if self.failures.pop(number, None) is not None:
-                self.batch.forget_failure(number)
+            self._record_finished(number, outcome)
+
+    def _record_failure(self, number: int, outcome: Outcome) -> None:
+        """Note the failure of a scene; try the scene again, or put it aside."""
+        earlier = self.failures.get(number, Failure())
+        died = outcome.state == "died"
+        failure = Failure(
+            errors=earlier.errors + (not died),
+            deaths=earlier.deaths + died,
+            error=outcome.error,
+        )
+        self.progress.failures += earlier.attempts == 0
+        self.failures[number] = failure
+        self.batch.note_failure(number, failure, outcome.log)
+        if failure.aside:
+            self.progress.aside += 1
             self._close(number)
+        else:
+            self.pending.append(number)  # again, after all others
+
+    def _record_finished(self, number: int, outcome: Outcome) -> None:
+        """Count a scene that is finished, made by this run or by another process."""
+        self.progress.finished += 1
+        if outcome.state == "made":
+            self.progress.made += 1
+            self.progress.frames += outcome.row["frames"]
+            self.progress.bytes += outcome.row["bytes"]
+            self.rows[number] = row(outcome.row, outcome.times)
+        if self.failures.pop(number, None) is not None:
+            self.batch.forget_failure(number)
+        self._close(number)
 
     def _close(self, number: int) -> None:
-        """Pack the tar file of a scene if no other scene of it is to be made."""
+        """Pack the tar file of a scene if no other scene of it is missing."""
         if self._tar_size:
-            self._open[number // self._tar_size] -= 1
+            self._missing[number // self._tar_size] -= 1
             self._pack(number // self._tar_size)
 
     def _pack(self, group: int) -> None:
-        if self._open[group] <= 0:
+        """Pack a tar file, by its number, if none of its scenes is missing."""
+        if self._missing[group] <= 0:
             pack(self.batch, group * self._tar_size, (group + 1) * self._tar_size)
+
+
+def _outcome(number: int, future: Future) -> Outcome:
+    """The outcome of a scene, also if its worker died."""
+    try:
+        return future.result()
+    except Exception as error:
+        message = " ".join(str(error).split())
+        return Outcome(number, "died", error=f"its worker died: {message}")
 
 
 def work(folder: str, number: int) -> Outcome:
     """Make one scene, in a worker.
 
-    The first on each machine is made alone, for it compiles the kernels for all others; so is the
-    first of each source, which makes the atlases.
+    The first scene on each machine is made alone, since it compiles the kernels for all others. So
+    is the first scene of each source, which makes the atlases.
     """
     batch = BatchFolder(Path(folder))
     sources = load_stored(batch.plan).plan.sources
@@ -228,8 +252,9 @@ def work(folder: str, number: int) -> Outcome:
 
 def in_shard(number: int, plan: Plan, shard: tuple[int, int]) -> bool:
     """Whether a scene belongs to a part of the batch; scenes of a tar file stay together."""
-    together = plan.store.scenes_per_tar if plan.store.format == "webdataset" else 1
-    return number // together % shard[1] == shard[0] - 1
+    group_size = plan.store.scenes_per_tar if plan.store.format == "webdataset" else 1
+    part, parts = shard
+    return number // group_size % parts == part - 1
 
 
 def run_batch(
@@ -239,9 +264,10 @@ def run_batch(
     *,
     progress: Callable[[Progress], None] | None = None,
 ) -> Progress:
-    """Make the scenes of a batch that are not there yet.
+    """Make the missing scenes of a batch.
 
-    It may be killed at any time and started again, also while others make scenes of the same batch.
+    A run may be killed at any time and started again, also while other processes make scenes of the
+    same batch.
 
     Parameters
     ----------
@@ -264,7 +290,7 @@ def run_batch(
         batch.check()
         plan = load_stored(batch.plan).plan
     for number in range(min(len(plan.sources), plan.count, _CHECKED_SCENES)):
-        Variation(plan, number).load()  # a key that fits nothing is told before anything is made
+        Variation(plan, number).load()  # refuses a key that fits nothing before any scene is made
     try:
         keep_plan(batch, stored(plan))
         if options.retry_failed:
@@ -282,14 +308,12 @@ def run_batch(
         try:
             run.work(executor, progress)
         except BaseException as error:  # such as Ctrl-C: unfinished scenes are made next time
-            gone = (
-                executor.refusal()
-                if isinstance(executor, DaskExecutor) and isinstance(error, Exception)
-                else None
-            )
+            refusal = None
+            if isinstance(executor, DaskExecutor) and isinstance(error, Exception):
+                refusal = executor.refusal()
             executor.shutdown(wait=False, cancel_futures=True)
-            if gone is not None:
-                raise gone from ConnectionError(str(error))
+            if refusal is not None:
+                raise refusal from ConnectionError(str(error))
             raise
         executor.shutdown()
         write_index(batch, run.rows)
@@ -316,29 +340,31 @@ def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
     lines = []
     for number in range(min(_SHOWN_SCENES, plan.count)):
         variation = Variation(plan, number)
-        values = (
-            ", ".join(f"{key} = {value}" for key, value in variation.load()[1].items())
-            or "nothing varies"
-        )
+        _, values = variation.load()
+        text = ", ".join(f"{key} = {value}" for key, value in values.items()) or "nothing varies"
         lines.append(
-            f"scene {number} ({Path(variation.source).name}, seed {variation.seed}): {values}"
+            f"scene {number} ({Path(variation.source).name}, seed {variation.seed}): {text}"
         )
     with tempfile.TemporaryDirectory(prefix="ripple-sim-trial-") as name:
         batch = BatchFolder(Path(name))
         keep_plan(batch, stored(plan))
         start = time.perf_counter()
-        compiled = sum(compile_times().values())
+        compiled_before = sum(compile_times().values())
         outcome = make_scene(name, 0)
         if outcome.state != "made":
             raise BatchError(f"scene 0 cannot be made: {outcome.error}")
-        seconds = time.perf_counter() - start - (sum(compile_times().values()) - compiled)
+        compiling = sum(compile_times().values()) - compiled_before  # [s]
+        seconds = time.perf_counter() - start - compiling
         size = sum(path.stat().st_size for path in batch.scene(0).rglob("*") if path.is_file())
-    count = workers or usual_workers()
-    folder = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+    worker_count = workers or usual_workers()
+    hours = plan.count * seconds / 3600
+    candidates = (folder, *folder.absolute().parents)
+    existing_folder = next(candidate for candidate in candidates if candidate.exists())
+    free = shutil.disk_usage(existing_folder).free
     lines.append(
         f"{plan.count} scenes of {outcome.row['frames']} frames: {seconds:.1f} s and "
-        f"{size / 1e6:.2f} MB for one, so about {plan.count * seconds / 3600:.2g} h of work (here "
-        f"by {count} workers, at best {plan.count * seconds / 3600 / count:.2g} h) and "
-        f"{plan.count * size / 1e9:.2g} GB; {shutil.disk_usage(folder).free / 1e9:.1f} GB are free"
+        f"{size / 1e6:.2f} MB for one, so about {hours:.2g} h of work (here by {worker_count} "
+        f"workers, at best {hours / worker_count:.2g} h) and {plan.count * size / 1e9:.2g} GB; "
+        f"{free / 1e9:.1f} GB are free"
     )
     return "\n".join(lines)

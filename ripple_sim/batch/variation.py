@@ -25,7 +25,7 @@ from .distribution import Distribution
 from .keys import Step, choose, parse_key
 from .plan import MeshesEntry, Plan
 
-# The stream of random numbers of a key.
+# Gives the stream of random numbers of a key.
 Stream = Callable[[str], np.random.Generator]
 
 # Keys by which an entry of a list is named, in this order.
@@ -46,7 +46,7 @@ ELEMENTS = {
     "actuator": "actuators",
 }
 
-# parts of a specification that have attributes but no elements
+# Groups of a specification that have attributes but no elements.
 _MODEL_GROUPS = ("option", "visual")
 
 # A seed of 29 bits has nine digits at most, as `ripple-sim render --seed` takes them.
@@ -71,11 +71,12 @@ def vary_table(
     values = {}
     for key, distribution in entries.items():
         for holder, place, name in _places(table, parse_key(key), ""):
-            value = values[name] = distribution.draw(stream(key if distribution.together else name))
+            value = distribution.draw(stream(key if distribution.together else name))
+            values[name] = value
             if distribution.apply != "set":
                 old = holder.get(place) if isinstance(holder, dict) else holder[place]
                 try:
-                    if old is None:  # left out, which numpy takes for NaN
+                    if old is None:  # left out of the table; NumPy would make it NaN
                         raise TypeError
                     value = combined(np.asarray(old, float), value, distribution.apply).tolist()
                 except (TypeError, ValueError, OverflowError) as error:
@@ -89,36 +90,40 @@ def vary_table(
 
 
 def _places(
-    table: dict[str, Any], steps: Sequence[Step], before: str
+    table: dict[str, Any], steps: Sequence[Step], prefix: str
 ) -> Iterator[tuple[Any, Any, str]]:
-    """Find the places that a key names.
+    """Find the places that a key names, from its steps; `prefix` is the key of the table.
 
     Yields the table or list that holds the value, the key or index in it, and the full key.
     """
-    (key, chosen) = steps[0]
-    rest = steps[1:]
-    here = f"{before}.{key}" if before else key
-    if not rest and not chosen:
-        yield table, key, here
+    key, selector = steps[0]
+    later_steps = steps[1:]
+    full_key = f"{prefix}.{key}" if prefix else key
+    if not later_steps and not selector:
+        yield table, key, full_key
         return
     inner = table.get(key)
-    if inner is None and not chosen:
+    if inner is None and not selector:
         inner = table[key] = {}
     if isinstance(inner, list) and all(isinstance(item, dict) for item in inner):
         names = [_name_of(item) for item in inner]
-        for number in choose(names, steps[0], "the scene"):
-            item = f"{here}[{names[number] or number}]"
-            if not rest:
-                raise SceneError(f"plan: {item} is a table; name one of its keys")
-            yield from _places(inner[number], rest, item)
-    elif isinstance(inner, list) and not rest and chosen.isdecimal() and int(chosen) < len(inner):
-        yield inner, int(chosen), f"{here}[{int(chosen)}]"
-    elif isinstance(inner, dict) and not chosen:
-        yield from _places(inner, rest, here)
+        for index in choose(names, steps[0], "the scene"):
+            item_key = f"{full_key}[{names[index] or index}]"
+            if not later_steps:
+                raise SceneError(f"plan: {item_key} is a table; name one of its keys")
+            yield from _places(inner[index], later_steps, item_key)
+    elif isinstance(inner, list) and not later_steps and _is_index(selector, inner):
+        yield inner, int(selector), f"{full_key}[{int(selector)}]"
+    elif isinstance(inner, dict) and not selector:
+        yield from _places(inner, later_steps, full_key)
     else:
-        raise SceneError(
-            f"plan: the scene has no {'.'.join([here, *(name for name, _ in rest)])} to vary"
-        )
+        missing = ".".join([full_key, *(name for name, _ in later_steps)])
+        raise SceneError(f"plan: the scene has no {missing} to vary")
+
+
+def _is_index(selector: str, items: Sequence[Any]) -> bool:
+    """Whether the text in a step's brackets is the index of an item."""
+    return selector.isdecimal() and int(selector) < len(items)
 
 
 def _name_of(item: dict[str, Any]) -> str:
@@ -154,7 +159,8 @@ def vary_model(
     values = {}
     for key, distribution in entries.items():
         for element, attribute, index, name in _attributes(spec, key):
-            value = values[name] = distribution.draw(stream(key if distribution.together else name))
+            value = distribution.draw(stream(key if distribution.together else name))
+            values[name] = value
             try:
                 _assign(element, attribute, index, value, distribution.apply)
             except (TypeError, ValueError, IndexError, OverflowError) as error:
@@ -178,23 +184,27 @@ def _attributes(spec: mujoco.MjSpec, key: str) -> Iterator[tuple[Any, str, int |
             f"as geom[ball].size, of {', '.join((*ELEMENTS, *_MODEL_GROUPS))}"
         )
     if kind in _MODEL_GROUPS:
-        found = [(getattr(spec, kind), kind)]
+        named_elements = [(getattr(spec, kind), kind)]
     else:
         elements = getattr(spec, ELEMENTS[kind])
-        names = [each.name for each in elements]
-        numbers = choose(names, first, "the model")
-        found = [(elements[number], f"{kind}[{names[number] or number}]") for number in numbers]
-    attribute, chosen = steps[-1]
-    index = int(chosen) if chosen.isdecimal() else None
-    for element, name in found:
+        names = [element.name for element in elements]
+        named_elements = [
+            (elements[number], f"{kind}[{names[number] or number}]")
+            for number in choose(names, first, "the model")
+        ]
+    attribute, selector = steps[-1]
+    index = int(selector) if selector.isdecimal() else None
+    brackets = f"[{selector}]" if selector else ""
+    for element, name in named_elements:
         for inner, _ in steps[:-1]:
-            element = _inner(element, inner, key)
+            element = _attribute(element, inner, key)
             name = f"{name}.{inner}"
-        _inner(element, attribute, key)
-        yield element, attribute, index, f"{name}.{attribute}" + (f"[{chosen}]" if chosen else "")
+        _attribute(element, attribute, key)  # raises if there is none
+        yield element, attribute, index, f"{name}.{attribute}{brackets}"
 
 
-def _inner(element: Any, attribute: str, key: str) -> Any:
+def _attribute(element: Any, attribute: str, key: str) -> Any:
+    """The attribute of an element that a key names; raises `SceneError` if there is none."""
     if not hasattr(element, attribute):
         valid = ", ".join(name for name in dir(element) if not name.startswith("_"))
         raise SceneError(
@@ -205,34 +215,34 @@ def _inner(element: Any, attribute: str, key: str) -> Any:
 
 
 def _assign(element: Any, attribute: str, index: int | None, value: Any, apply: str) -> None:
-    """Set an attribute; a vector takes as many numbers as are given, like an MJCF's."""
+    """Set an attribute; a vector takes as many numbers as there are, like an MJCF's."""
     old = getattr(element, attribute)
+    # a mass that the MJCF leaves out follows from the density
     if attribute == "mass" and apply == "multiply" and not np.isfinite(old):
         attribute = "density"
         old = element.density
     if isinstance(old, np.ndarray):
         new = old.copy()
-        given = np.atleast_1d(np.asarray(value, float))
-        part: slice = np.s_[index : index + 1] if index is not None else np.s_[: len(given)]
+        numbers = np.atleast_1d(np.asarray(value, float))
+        entries: slice = np.s_[index : index + 1] if index is not None else np.s_[: len(numbers)]
         if apply == "multiply" and index is None and np.ndim(value) == 0:
-            part = np.s_[:]
-        new[part] = given if apply == "set" else combined(old[part], given, apply)
+            entries = np.s_[:]
+        new[entries] = numbers if apply == "set" else combined(old[entries], numbers, apply)
         if attribute == "quat" and hasattr(element, "alt"):
             element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
         setattr(element, attribute, new)
     elif isinstance(old, str):
         setattr(element, attribute, value)
     else:
-        setattr(
-            element, attribute, type(old)(value if apply == "set" else combined(old, value, apply))
-        )
+        number = value if apply == "set" else combined(old, value, apply)
+        setattr(element, attribute, type(old)(number))
 
 
 class Variation:
     """The scene of a number; it does not depend on the worker or on the order.
 
-    Each key has a stream of random numbers of its own, so a key more in the plan leaves the values
-    of the others.
+    Each key has a stream of random numbers of its own, so that another key in the plan does not
+    change the values of the others.
 
     Attributes
     ----------
@@ -244,15 +254,14 @@ class Variation:
         self.plan = plan
         self.number = number
         self.source = plan.sources[number % len(plan.sources)]
-        drawn = np.random.SeedSequence(plan.seed, spawn_key=(number,)).generate_state(1)[0]
-        self.seed = int(drawn) >> (32 - _SEED_BITS)
+        sequence = np.random.SeedSequence(plan.seed, spawn_key=(number,))
+        self.seed = int(sequence.generate_state(1)[0]) >> (32 - _SEED_BITS)
 
     def stream(self, key: str) -> np.random.Generator:
         """The random numbers of a key."""
-        spawned = np.random.SeedSequence(
-            self.plan.seed, spawn_key=(self.number, zlib.crc32(key.encode()))
-        )
-        return np.random.Generator(np.random.PCG64(spawned))
+        spawn_key = (self.number, zlib.crc32(key.encode()))
+        sequence = np.random.SeedSequence(self.plan.seed, spawn_key=spawn_key)
+        return np.random.Generator(np.random.PCG64(sequence))
 
     def load(self) -> tuple[Scene, dict[str, Any]]:
         """Load the scene, and the values drawn for it by their keys.
@@ -272,30 +281,43 @@ class Variation:
         if Path(self.source).suffix in ("", ".toml"):
             scene = load_scene(self.source, edit=edit, change=change)
         else:
-            meshes = self.plan.meshes or MeshesEntry([], bodies=0)
-            bodies = meshes.bodies
-            if isinstance(bodies, Distribution):
-                bodies = bodies.draw(self.stream("bodies"))
-                if not isinstance(bodies, int):
-                    raise SceneError(
-                        f"plan: the number of bodies is {bodies!r}; draw it from integers"
-                    )
-            values["bodies"] = bodies
-            scene = drop_scene(
-                self.source,
-                bodies=bodies,
-                seed=self.seed,
-                up=meshes.up,
-                look=meshes.look,
-                edit=edit,
-                repair=meshes.repair,
-                wrap=meshes.wrap,
-            )
-            # as in a scene file: values that differ from the defaults, as plain values
-            parts = {"ripple": list(scene.targets), "camera": scene.camera}
-            parts |= {name: list(events) for name, events in vars(scene.events).items()}
-            table = {"model": scene.name, "duration": scene.duration, "two_way": scene.two_way}
-            table |= {key: msgspec.to_builtins(part) for key, part in parts.items() if part}
+            values["bodies"] = self._body_count()
+            scene = self._drop_scene(values["bodies"], edit)
+            table = _table_of(scene)
             change(table)
             scene = scene_of(scene.name, scene.model, parse_scene(table, scene.name), scene.notes)
         return scene, dict(sorted(values.items()))
+
+    def _body_count(self) -> int:
+        """Number of bodies that drop on a mesh."""
+        bodies = 0 if self.plan.meshes is None else self.plan.meshes.bodies
+        if isinstance(bodies, Distribution):
+            bodies = bodies.draw(self.stream("bodies"))
+            if not isinstance(bodies, int):
+                raise SceneError(f"plan: the number of bodies is {bodies!r}; draw it from integers")
+        return bodies
+
+    def _drop_scene(self, bodies: int, edit: Callable[[mujoco.MjSpec], None]) -> Scene:
+        """The scene in which bodies drop on the mesh."""
+        meshes = self.plan.meshes or MeshesEntry([])
+        return drop_scene(
+            self.source,
+            bodies=bodies,
+            seed=self.seed,
+            up=meshes.up,
+            look=meshes.look,
+            edit=edit,
+            repair=meshes.repair,
+            wrap=meshes.wrap,
+        )
+
+
+def _table_of(scene: Scene) -> dict[str, Any]:
+    """The table of a scene as a scene file has it: values that differ from the defaults."""
+    table = {"model": scene.name, "duration": scene.duration, "two_way": scene.two_way}
+    entries = {"ripple": list(scene.targets), "camera": scene.camera}
+    entries |= {name: list(events) for name, events in vars(scene.events).items()}
+    for key, entry in entries.items():
+        if entry:
+            table[key] = msgspec.to_builtins(entry)
+    return table

@@ -1,6 +1,6 @@
 """`make_scene`: make one scene of a batch, in a folder of its own, in any process.
 
-Beside its frames a running scene leaves a `FrameRecord`: impulses, heights, positions, energies.
+A `FrameRecord` writes impulses, heights, positions and energies while the scene runs.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 from numpy.lib.format import open_memmap
+from numpy.typing import NDArray
 from PIL import Image
 
 from ripple_sim.errors import BatchError, EncodingError
@@ -42,13 +43,12 @@ from .folder import BatchFolder, clear, load_stored
 from .plan import Plan, StoreEntry, options_of, video_name
 from .variation import Variation
 
-# [pixels]: longer edge of a thumbnail
+# Longer edge of a thumbnail [pixels].
 _THUMBNAIL_SIZE = 160
 
 # Time of every file in the zip file of heights. It is fixed, so that the same heights give the same
 # bytes.
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
-
 
 # The renderer's context belongs to one scene at a time, also if an executor has threads.
 _one_at_a_time = threading.Lock()
@@ -87,10 +87,10 @@ class FrameRecord:
         if self._heights is not None:
             self._heights.fixed("time", ["time"], np.arange(frames) / rate, "s")
         self._positions: np.memmap | None = None
-        self._rows: list[tuple] = []
-        self._total = 0.0
-        self._highest: dict[str, float] = {}
-        self._energies: dict[str, list[float]] = {}
+        self._rows: list[tuple] = []  # of the table of impulses
+        self._total_impulse = 0.0  # [N s]
+        self._highest: dict[str, float] = {}  # by target [m]
+        self._energies: dict[str, list[float]] = {}  # by target, frame by frame [J]
         self._digest = hashlib.blake2b(digest_size=16)
         self._sensors: Mapping[str, Sensor] = {}
         self.frame = 0
@@ -110,24 +110,25 @@ class FrameRecord:
         for name in ripples:
             height = ripples[name].height
             if self._heights is not None:
-                suffix = re.sub(r"\W", "_", name)
-                if not self.frame:
-                    dimensions = [
-                        "time",
-                        *(f"{each}_{suffix}" for each in ("chart", "row", "column")),
-                    ]
-                    array = self._heights.grow(f"height_{suffix}", dimensions, height, "m", chunk=1)
-                    array.attrs["target"] = name
-                self._heights.add(f"height_{suffix}", height)
+                self._store_height(self._heights, name, height)
             self._digest.update(height.tobytes())
             self._highest[name] = max(self._highest.get(name, 0.0), float(np.abs(height).max()))
             self._energies.setdefault(name, []).append(ripples[name].energy())
         if self._heights is not None:
             self._heights.flush()  # so that memory does not grow with the scene
         self._sensors = simulation.sensors
-        self._total += sum(each.impulse for each in simulation.impulses)
+        self._total_impulse += sum(impulse.impulse for impulse in simulation.impulses)
         self._rows += rows(self.frame, data, simulation.impulses)
         self.frame += 1
+
+    def _store_height(self, store: Store, name: str, height: NDArray[np.float32]) -> None:
+        """Add the height of a target at the present frame to the store."""
+        suffix = re.sub(r"\W", "_", name)
+        if self.frame == 0:
+            dimensions = ["time", f"chart_{suffix}", f"row_{suffix}", f"column_{suffix}"]
+            array = store.grow(f"height_{suffix}", dimensions, height, "m", chunk=1)
+            array.attrs["target"] = name
+        store.add(f"height_{suffix}", height)
 
     def finish(self) -> dict[str, Any]:
         """Complete the files, and return the facts of the scene, in SI units."""
@@ -136,14 +137,7 @@ class FrameRecord:
             self._positions = None
         if self._heights is not None:
             self._heights.finish()
-            folder = self._folder / HEIGHTS.removesuffix(".zip")
-            with zipfile.ZipFile(self._folder / HEIGHTS, "w") as archive:
-                for path in sorted(path for path in folder.rglob("*") if path.is_file()):
-                    archive.writestr(
-                        zipfile.ZipInfo(path.relative_to(folder).as_posix(), _ZIP_TIME),
-                        path.read_bytes(),
-                    )
-            shutil.rmtree(folder)
+            _zip_folder(self._folder / HEIGHTS.removesuffix(".zip"), self._folder / HEIGHTS)
         if self._sensors:
             arrays = {name: sensor.samples for name, sensor in self._sensors.items()}
             times = {f"{name} time": sensor.times for name, sensor in self._sensors.items()}
@@ -156,7 +150,7 @@ class FrameRecord:
         return {
             "frames": self.frame,
             "contacts": len(self._rows),
-            "impulse": self._total,
+            "impulse": self._total_impulse,
             "targets": {
                 name: {
                     "height_max": self._highest[name],
@@ -169,18 +163,31 @@ class FrameRecord:
         }
 
 
+def _zip_folder(folder: Path, output: Path) -> None:
+    """Move the files of a folder into a zip file."""
+    with zipfile.ZipFile(output, "w") as archive:
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            name = path.relative_to(folder).as_posix()
+            archive.writestr(zipfile.ZipInfo(name, _ZIP_TIME), path.read_bytes())
+    shutil.rmtree(folder)
+
+
 class Outcome(msgspec.Struct, frozen=True):
     """The outcome of a worker's scene.
 
     Attributes
     ----------
     state : str
-        "made"; "there", finished by another process before; "busy", being made by one; "full", for
-        lack of room on the disk; "failed"; "died", its worker, without a word.
+        - "made": the worker has made the scene.
+        - "there": another process had finished it before.
+        - "busy": another process makes it.
+        - "full": the disk has no room for it.
+        - "failed": an error ended it.
+        - "died": the worker ended without an answer.
     times : dict
-        How long it took [s]: `seconds` by the clock, `cpu_seconds` of the worker's threads.
+        How long the scene took [s]: `seconds` by the clock, `cpu_seconds` of the worker's threads.
     row : dict
-        What the index says of it.
+        Facts of the scene, from which its row of the index is made.
     error, log : str
         What went wrong, in a line and in full.
     """
@@ -197,11 +204,11 @@ def make_scene(folder: str, number: int) -> Outcome:
     """Make a scene of the batch in a folder, unless it is there or another process makes it.
 
     Its files do not depend on the worker or the time, byte for byte, except `times.json`, which
-    tells these.
+    names them.
     """
     batch = BatchFolder(Path(folder))
     start = time.perf_counter()
-    work = time.process_time()
+    cpu_start = time.process_time()
     with _one_at_a_time, batch.claimed(number) as place:
         if place is None:
             return Outcome(number, "there" if batch.is_finished(number) else "busy")
@@ -209,28 +216,29 @@ def make_scene(folder: str, number: int) -> Outcome:
             facts = _make(load_stored(batch.plan).plan, number, place, batch)
             times = {
                 "seconds": time.perf_counter() - start,
-                "cpu_seconds": time.process_time() - work,
+                "cpu_seconds": time.process_time() - cpu_start,
             }
-            _write_json(
-                place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()}
-            )
+            worker = {"host": socket.gethostname(), "process": os.getpid()}
+            _write_json(place / TIMES, {**times, **worker})
         except Exception as error:  # of any kind: the batch continues without this scene
             clear(place)
-            reason: BaseException | None = error
-            while isinstance(reason, EncodingError):  # which names the file
-                reason = reason.__cause__
-            full = isinstance(reason, OSError) and reason.errno in (errno.ENOSPC, errno.EDQUOT)
-            said = " ".join(str(error).split()) or type(error).__name__
-            return Outcome(
-                number, "full" if full else "failed", error=said, log=traceback.format_exc()
-            )
+            state: Literal["full", "failed"] = "full" if _is_full_disk(error) else "failed"
+            message = " ".join(str(error).split()) or type(error).__name__
+            return Outcome(number, state, error=message, log=traceback.format_exc())
         batch.finish(number, place)
     return Outcome(number, "made", times, facts)
 
 
+def _is_full_disk(error: BaseException | None) -> bool:
+    """Whether an error, or the cause of an `EncodingError`, is that the disk is full."""
+    while isinstance(error, EncodingError):
+        error = error.__cause__
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
 def _make(plan: Plan, number: int, folder: Path, batch: BatchFolder) -> dict[str, Any]:
-    """Fill the folder of a scene; return what is to be known of it."""
-    clear(folder)  # of one that was killed
+    """Fill the folder of a scene; return the facts of the scene."""
+    clear(folder)  # of files that a killed process left
     variation = Variation(plan, number)
     scene, values = variation.load()
     record = render_scene(scene, plan.store, folder)
@@ -252,7 +260,7 @@ def _make(plan: Plan, number: int, folder: Path, batch: BatchFolder) -> dict[str
 
 
 def render_scene(scene: Scene, store: StoreEntry, folder: Path) -> FrameRecord:
-    """Simulate a scene, render it if it is to be drawn, and record it."""
+    """Simulate a scene, render it if the plan stores a video, and record it."""
     name = video_name(store)
     path = folder / (name or "frames")
     options = settled(options_of(store), scene, path)
@@ -269,6 +277,7 @@ def render_scene(scene: Scene, store: StoreEntry, folder: Path) -> FrameRecord:
 
 
 def _digest(path: Path) -> str:
+    """Fingerprint of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
 
