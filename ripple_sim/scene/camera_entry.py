@@ -15,9 +15,11 @@ from ripple_sim.errors import SceneError
 
 from .events import Vector
 
-# Most images of which a frame is the mean.
+# Largest number of images whose mean is a frame.
 MAX_EXPOSURES = 1024
 
+# Fields of a key that move the camera.
+PATH_FIELDS = ("lookat", "distance", "azimuth", "elevation", "fovy")
 
 # MuJoCo's modes of cameras that turn to a body.
 _TURNS_TO_BODY = (
@@ -45,10 +47,6 @@ class CameraKey(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """Likewise."""
     fovy: float | None = None
     """Vertical field of view [degrees]."""
-
-
-# What a key may give.
-PATH_FIELDS = ("lookat", "distance", "azimuth", "elevation", "fovy")
 
 
 class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -119,7 +117,7 @@ def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
 
 
 def _check_path(entry: CameraEntry) -> None:
-    """Refuse keys that make no path."""
+    """Refuse keys that do not make a path."""
     if entry.key and entry.name is not None:
         raise SceneError(
             f"[[camera.key]] moves the free camera, and the camera {entry.name!r} of the model has "
@@ -130,14 +128,14 @@ def _check_path(entry: CameraEntry) -> None:
             f"orbit = {entry.orbit:g} and the azimuths of [[camera.key]] both turn the camera; "
             "leave one of the two out"
         )
-    last = -np.inf
+    previous_time = -np.inf
     for key in entry.key:
-        if not last < key.time < np.inf:
+        if not previous_time < key.time < np.inf:
             raise SceneError(
-                f"a [[camera.key]] at {key.time:g} s follows one at {last:g} s; the times of keys "
-                "must increase"
+                f"a [[camera.key]] at {key.time:g} s follows one at {previous_time:g} s; the times "
+                "of keys must increase"
             )
-        last = key.time
+        previous_time = key.time
         if all(getattr(key, name) is None for name in PATH_FIELDS):
             raise SceneError(
                 f"the [[camera.key]] at {key.time:g} s gives nothing but its time; give one or "
@@ -150,7 +148,7 @@ def _check_path(entry: CameraEntry) -> None:
 
 
 def _check_optics(entry: CameraEntry) -> None:
-    """Refuse numbers out of range."""
+    """Refuse numbers of shutter, lens and exposures that are out of range."""
     if not 0 <= entry.shutter <= 360:
         _refuse("shutter angle", entry.shutter, "0 to 360 degrees")
     if not 0 <= entry.aperture < np.inf:

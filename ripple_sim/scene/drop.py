@@ -28,7 +28,7 @@ from .scene_file import Color, RippleEntry
 from .source import scene_path, shipped_scenes
 from .standing import SIZE, UP_AXES, stand, usual_up
 
-# Of the scene [s].
+# Duration of the scene [s].
 DURATION = 5.0
 
 # Depth of a typical hit: over half the usual thickness of the target, and over the radius of a tube
@@ -36,8 +36,8 @@ DURATION = 5.0
 _DEPTH_OVER_THICKNESS = 5.6
 _DEPTH_OVER_RADIUS = 2.8
 
-# The same at most over the size, of a closed target and of one with rims, at which waves are twice
-# as high.
+# Largest depth of a typical hit over the size: of a closed target, and of one with rims, at which
+# waves are twice as high.
 _MAX_DEPTH = 0.2
 _MAX_DEPTH_OPEN = 0.12
 
@@ -45,10 +45,10 @@ _MAX_DEPTH_OPEN = 0.12
 _CROSSING_TIME = 1.5
 _DECAY_TIME = 2.5
 
-# Stiff enough for crest behind crest [1/s^2].
+# Least stiffness of the surface [1/s^2]: with it a crest follows behind another.
 _MIN_STIFFNESS = 1000.0
 
-# Tubes of this radius, over the size, get bodies of the usual size; more slender ones get smaller
+# Tubes of this radius, over the size, get bodies of the usual size. More slender tubes get smaller
 # bodies, down to the second share of the usual size.
 _SLENDER_RADIUS = 0.05
 _MIN_BODY_SCALE = 0.5
@@ -84,24 +84,25 @@ def drop_scene(
     ----------
     mesh_path : path
     bodies : int
-        How many drop, 0 to 100, over the first 3.5 seconds.
+        Number of bodies, 0 to 100, which drop over the first 3.5 seconds.
     seed : int
-        Of their sizes, places and colours.
+        Seed of their sizes, places and colours.
     up : str, optional
-        Axis of the file that points up, "y" or "z". By default a sheet lies down, which is open, in
-        one part, and thinner than a third of its longest extent; else see `usual_up`, unless the
-        mesh would fall over on that axis, and stands on the other.
+        Axis of the file that points up, "y" or "z". By default a sheet lies down: an open mesh in
+        one part that is thinner than a third of its longest extent. For other meshes see
+        `usual_up`, unless the mesh would fall over on that axis, and stands on the other.
     look : str
-        Of the target, one of `LOOKS`.
+        Look of the target, one of `LOOKS`.
     color : (float, float, float), optional
-        Of the target, sRGB, 0 to 1, in place of its texture, its vertices' colours or the look's.
+        Colour of the target, sRGB, 0 to 1, in place of its texture, its vertices' colours or the
+        look's.
     texture : path, optional
         Image instead of the look's colour; for the default see `paint_target`.
     view : str or float, optional
         "front", "left", "back", "right" or "top", or an azimuth [degrees]: where the camera is
         half-way of its orbit. By default a view that shows the front and where bodies land.
     elevation : float, optional
-        Of the camera [degrees]; negative looks down.
+        Elevation of the camera [degrees]; negative looks down.
     shapes : sequence of str, optional
         Shapes of the bodies in turn, of `BODY_SHAPES`; a ball is a sphere. By default all, on open
         meshes without boxes and cylinders, which MuJoCo may throw aside there.
@@ -126,15 +127,17 @@ def drop_scene(
     V, note = stand(mesh, up, usual_up(mesh_path))
     camera, eye = drop_camera(V, mesh.F, mesh.closed, DURATION, view, elevation)
     extent = Extent.of(mesh)
-    slender = _slenderness(mesh, extent)
-    scale = float(np.clip(slender / _SLENDER_RADIUS, _MIN_BODY_SCALE, 1.0))
-    material = _material(mesh, extent, slender, scale)
+    slenderness = _slenderness(mesh, extent)
+    scale = float(np.clip(slenderness / _SLENDER_RADIUS, _MIN_BODY_SCALE, 1.0))
+    material = _material(mesh, extent, slenderness, scale)
     rng = np.random.default_rng(seed)
-    in_turn = [body_shapes[i % len(body_shapes)] for i in range(bodies)]
-    spec, drops = drop_model(V, mesh.F, in_turn, rng, eye, scale)
+    shapes_in_turn = [body_shapes[i % len(body_shapes)] for i in range(bodies)]
+    spec, drops = drop_model(V, mesh.F, shapes_in_turn, rng, eye, scale)
     if not mesh.closed:
         make_collidable(spec, "target", "flex")
-    not_shown = paint_target(spec, mesh, mesh_path, texture)
+    notes = [*mesh.notes, *paint_target(spec, mesh, mesh_path, texture)]
+    if note:
+        notes.append(note)
     if edit is not None:
         edit(spec)
     with refusal_of(f"the mesh {str(mesh_path)!r}"):
@@ -147,7 +150,7 @@ def drop_scene(
         camera=camera,
         duration=DURATION,
         events=Events(drop=tuple(drops)),
-        notes=(*mesh.notes, *not_shown, *filter(None, [note])),
+        notes=tuple(notes),
     )
     check_scene(scene)
     return scene
@@ -178,12 +181,15 @@ def _slenderness(mesh: Mesh, extent: Extent) -> float:
     return extent.area / (np.pi * max(rim_length, 2 * extent.size) * extent.size)
 
 
-def _material(mesh: Mesh, extent: Extent, slender: float, scale: float) -> MaterialEntry:
-    """Waves slow and high enough to watch under typical bodies of a scale, crest behind crest."""
+def _material(mesh: Mesh, extent: Extent, slenderness: float, scale: float) -> MaterialEntry:
+    """A material whose waves are slow and high enough to watch, crest behind crest.
+
+    The waves are those of a typical hit by bodies of a scale.
+    """
     mass, speed = TYPICAL_HIT
     amplitude = min(
         _DEPTH_OVER_THICKNESS * extent.radius / extent.size,
-        _DEPTH_OVER_RADIUS * slender,
+        _DEPTH_OVER_RADIUS * slenderness,
         _MAX_DEPTH if mesh.closed else _MAX_DEPTH_OPEN,
     )
     suited = Material.suited(
@@ -210,7 +216,7 @@ def find_scene(target: str | Path, *, seed: int | None = None) -> Scene:
     ----------
     target : str or path
     seed : int, optional
-        As for `load_scene`, or of `drop_scene`.
+        As for `load_scene` or `drop_scene`.
 
     Raises
     ------

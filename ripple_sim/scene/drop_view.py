@@ -24,8 +24,8 @@ VIEWS = {"front": 90.0, "left": 0.0, "back": 270.0, "right": 180.0, "top": 90.0}
 _AZIMUTHS = [125.0, 55.0, 145.0, 35.0, 215.0, 325.0, 235.0, 305.0]
 _STRAIGHT_AZIMUTHS = [110.0, 70.0]
 
-# What is lower than this share of its width lies, and reads from the front: its views are at most
-# so far to the side [degrees].
+# A target that is lower than this share of its width lies, and is read from the front: its views
+# are at most so far to the side [degrees].
 _LYING_HEIGHT = 0.5
 _MAX_SIDEWAYS = 35.0
 
@@ -38,7 +38,7 @@ _TOP_ELEVATION = -90.0
 # Vertical field of view of the camera [degrees].
 _FOVY = 28.0
 
-# By which the camera circles [degrees/s].
+# Rate at which the camera circles [degrees/s].
 _ORBIT = 5.0
 
 # Height and width of the frame that the target may fill.
@@ -53,29 +53,38 @@ _ASPECT = 16 / 9
 # Points of the surface by which views are compared.
 _VIEW_POINTS = 1500
 
-# Least upward part of the normal of what bodies land on.
+# Least upward part of the normal of a surface on which bodies land.
 _MIN_TOP_NORMAL = 0.5
 
-# A head is round: what is uppermost faces in so many directions at least, of the 26 that are told
-# apart. The edge of a wall faces in 5.
+# A head is round: the uppermost part of the target faces in so many directions at least, of the 26
+# that are distinguished. The edge of a wall faces in 5.
 _MIN_HEAD_DIRECTIONS = 8.0
 
-# What the parts of a view's score weigh, beside its variety and the logarithm of its area.
+# Share of the points that count as the uppermost part, and as the base.
+_END_SHARE = 0.1
+
+# Weights of a view's score; its variety and the logarithm of its area have weight 1.
 _LANDING_WEIGHT = 3.0
 _HEAD_WEIGHT = 3.0
 _FRONT_WEIGHT = 0.6
 
-# By how much a straight view must have a better score than three-quarter views, which show depth.
+# Straight views are chosen if their score is better by this: three-quarter views show depth.
 _STRAIGHT_COST = 0.35
+
+# Keeps divisions and logarithms finite.
+_TINY = 1e-300
+
+# Steps after which the fit of a view changes by less than a pixel.
+_FITTING_STEPS = 8
 
 
 class _Subject(NamedTuple):
-    """What is compared of a target in each view.
+    """The parts of a target that views are compared by.
 
     Attributes
     ----------
     scene : RayScene
-        Its surface.
+        The surface, for rays.
     points, normals : float64 [k, 3]
         Spread over the surface [m], and unit normals.
     corners : float64 [l, 3]
@@ -132,8 +141,7 @@ def drop_camera(
     from_top = view == "top"
     azimuth = _azimuth(view)
     if elevation is None:
-        usual = _FLAT_ELEVATION + (_HIGH_ELEVATION - _FLAT_ELEVATION) * _uprightness(V)
-        elevation = _TOP_ELEVATION if from_top else usual
+        elevation = _TOP_ELEVATION if from_top else _usual_elevation(V)
     elif not (is_finite(elevation) and -90 <= elevation <= 90):
         raise SceneError(
             "elevation must be a number from -90, straight down, to 90 degrees, got "
@@ -178,7 +186,9 @@ def _best_azimuth(
         scores[azimuth] = _score(subject, V, azimuth, elevation) - _STRAIGHT_COST
     candidates = list(scores)
     if _uprightness(V) < _LYING_HEIGHT:
-        candidates = [each for each in scores if abs(each - VIEWS["front"]) <= _MAX_SIDEWAYS]
+        candidates = [
+            azimuth for azimuth in scores if abs(azimuth - VIEWS["front"]) <= _MAX_SIDEWAYS
+        ]
     return max(candidates, key=lambda azimuth: scores[azimuth])
 
 
@@ -188,7 +198,13 @@ def _uprightness(V: NDArray[np.float64]) -> float:
     return float(min(height / max(width, depth), 1.0))
 
 
+def _usual_elevation(V: NDArray[np.float64]) -> float:
+    """Elevation of the camera [degrees], the steeper, the flatter the target."""
+    return _FLAT_ELEVATION + (_HIGH_ELEVATION - _FLAT_ELEVATION) * _uprightness(V)
+
+
 def _subject(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> _Subject:
+    """The parts of a target that views are compared by."""
     scene = RayScene(V, F)
     points, normals = sampled(V, F, _VIEW_POINTS)
     upward = normals[:, 2] if closed else np.abs(normals[:, 2])
@@ -212,10 +228,10 @@ def _subject(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> _Sub
 def _head(points: NDArray[np.float64], bins: NDArray[np.int64]) -> NDArray[np.float64]:
     """Direction of the head from the middle of the base, over the size [2]; 0 if there is no head.
 
-    The head is what is uppermost, if it is round.
+    The head is the uppermost part, if it is round.
     """
-    is_upper = points[:, 2] >= np.quantile(points[:, 2], 0.9)
-    is_base = points[:, 2] <= np.quantile(points[:, 2], 0.1)
+    is_upper = points[:, 2] >= np.quantile(points[:, 2], 1 - _END_SHARE)
+    is_base = points[:, 2] <= np.quantile(points[:, 2], _END_SHARE)
     if np.exp(_entropy(np.bincount(bins[is_upper]))) < _MIN_HEAD_DIRECTIONS:
         return np.zeros(2)
     lean = points[is_upper].mean(axis=0) - points[is_base].mean(axis=0)
@@ -224,38 +240,45 @@ def _head(points: NDArray[np.float64], bins: NDArray[np.int64]) -> NDArray[np.fl
 
 def _entropy(weights: NDArray) -> float:
     """Entropy of shares in proportion to weights."""
-    shares = weights / max(float(weights.sum()), 1e-300)
-    return -float((shares * np.log(np.maximum(shares, 1e-300))).sum())
+    shares = weights / max(float(weights.sum()), _TINY)
+    return -float((shares * np.log(np.maximum(shares, _TINY))).sum())
 
 
 def _score(subject: _Subject, V: NDArray[np.float64], azimuth: float, elevation: float) -> float:
     """How much a view shows of a target.
 
-    It counts the share that is seen of the places where bodies land; the front, from which letters
-    read; the side to which the head leans; the area in the picture; and the details: many vertices,
-    and normals in many directions. Their variety is the entropy of those that are seen (as in Page
-    et al. 2003, "Shape analysis algorithm based on information theory").
+    The score counts
+
+    - the share that is visible of the places where bodies land;
+    - the front, from which letters read;
+    - the side to which the head leans;
+    - the area in the picture;
+    - the details: many visible vertices, and normals in many directions. The variety of directions
+      is the entropy of those that are visible (as in Page et al. 2003, "Shape analysis algorithm
+      based on information theory").
     """
-    points, normals, corners = subject.points, subject.normals, subject.corners
     lookat, distance, eye = _fitted(V, azimuth, elevation)
-    rays = eye - points
-    cosine = np.einsum("ij,ij->i", rays, normals) / np.linalg.norm(rays, axis=1)
-    outer = normals * np.sign(cosine)[:, None]
-    is_clear = subject.scene.distances(points + 1e-4 * SIZE * outer, rays) > 1
+    rays = eye - subject.points
+    cosine = np.einsum("ij,ij->i", rays, subject.normals) / np.linalg.norm(rays, axis=1)
+    outer_normals = subject.normals * np.sign(cosine)[:, None]
+    ray_starts = subject.points + 1e-4 * SIZE * outer_normals
+    is_clear = subject.scene.distances(ray_starts, rays) > 1
     is_seen = is_clear & ((cosine > 0) | (not subject.closed))
     # area that each point stands for in the picture
     area = np.where(is_seen, np.abs(cosine), 0.0) / distance**2
     variety = _entropy(np.bincount(subject.bins, weights=area))
     landing = is_seen[subject.is_landing].mean() if subject.is_landing.any() else 0.0
-    towards = (eye - lookat)[:2] / distance
-    front = -towards[1]
-    detail = (subject.scene.distances(corners + 1e-3 * (eye - corners), eye - corners) > 1).mean()
+    towards_camera = (eye - lookat)[:2] / distance
+    front = -towards_camera[1]
+    corner_rays = eye - subject.corners
+    corner_starts = subject.corners + 1e-3 * corner_rays
+    detail = (subject.scene.distances(corner_starts, corner_rays) > 1).mean()
     return float(
         variety
         + _LANDING_WEIGHT * landing
-        + _HEAD_WEIGHT * subject.head @ towards
+        + _HEAD_WEIGHT * subject.head @ towards_camera
         + _FRONT_WEIGHT * front
-        + np.log(max(area.sum() * detail, 1e-300))
+        + np.log(max(area.sum() * detail, _TINY))
     )
 
 
@@ -270,12 +293,12 @@ def _fitted(
     distance = 3 * SIZE
     tangent = np.tan(np.radians(_FOVY) / 2)
     spans = 2 * tangent * np.array([_ASPECT * _FILLED[1], _FILLED[0]])
-    for _ in range(8):  # by then it changes by less than a pixel
+    for _ in range(_FITTING_STEPS):
         pose = Camera(tuple(lookat.tolist()), distance, azimuth, elevation, _FOVY).pose()
         local = (V - pose.position) @ pose.rotation
-        seen = local[:, :2] / -local[:, 2:]
-        low = seen.min(axis=0)
-        high = seen.max(axis=0)
+        in_picture = local[:, :2] / -local[:, 2:]
+        low = in_picture.min(axis=0)
+        high = in_picture.max(axis=0)
         middle = (low + high) / 2 + [0.0, 2 * tangent * _BELOW_MIDDLE]
         lookat = lookat + pose.rotation[:, :2] @ middle * distance
         distance *= float(((high - low) / spans).max())

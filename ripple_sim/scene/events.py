@@ -1,7 +1,7 @@
 """A scene's script: timed events of bodies and surfaces.
 
-Free bodies are dropped (and held until then), thrown or placed; surfaces are poked, or get another
-material.
+Free bodies are dropped (and held in place until then), thrown or placed; surfaces are poked, or get
+another material; actuators get another control.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ripple_sim.errors import SceneError
 
 from .material_entry import MaterialChange, given_fields
 
-# An event is due if its time differs from the simulation's by no more [s].
+# An event is due from this time before its own time on, since times have round-off [s].
 _ROUND_OFF = 1e-9
 
 Vector = tuple[float, float, float]
@@ -168,40 +168,41 @@ class Script:
     """
 
     def __init__(self, model: mujoco.MjModel, events: Events, targets: Sequence[str]) -> None:
-        moved: list[DropEntry | ThrowEntry | PlaceEntry] = [
+        moves: list[DropEntry | ThrowEntry | PlaceEntry] = [
             *events.drop,
             *events.throw,
             *events.place,
         ]
-        self._moved = []
-        for entry in sorted(moved, key=lambda entry: entry.time):
+        # events of bodies, with the addresses of their joints in qpos and qvel
+        self._moves = []
+        for entry in sorted(moves, key=lambda entry: entry.time):
             position, velocity = free_joint(model, entry)
-            self._moved.append((entry, position, velocity))
-        # poses of bodies that are held [m], by name
-        self._home: dict[str, NDArray[np.float64]] = {}
+            self._moves.append((entry, position, velocity))
+        # poses in which bodies are held until they drop, by name
+        self._held_poses: dict[str, NDArray[np.float64]] = {}
         surfaces: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
         for surface in surfaces:
             _check_surface(model, surface, targets)
         controls = sorted(events.control, key=lambda entry: entry.time)
         self._actuators = {entry.actuator: _actuator(model, entry) for entry in controls}
-        sudden: list[PokeEntry | ChangeEntry | ControlEntry] = [*controls, *surfaces]
-        self._sudden = sorted(sudden, key=lambda entry: entry.time)
+        others: list[PokeEntry | ChangeEntry | ControlEntry] = [*controls, *surfaces]
+        self._others = sorted(others, key=lambda entry: entry.time)
 
     def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
         """Carry out the events that are due."""
-        begun = 0
-        for entry, position, velocity in self._moved:
-            if isinstance(entry, DropEntry):  # held in place until its time has come
+        move_count = 0
+        for entry, position, velocity in self._moves:
+            if isinstance(entry, DropEntry):  # the body is held until the time of its drop
                 pose = slice(position, position + 7)
-                data.qpos[pose] = self._home.setdefault(entry.body, data.qpos[pose].copy())
+                data.qpos[pose] = self._held_poses.setdefault(entry.body, data.qpos[pose].copy())
                 data.qvel[velocity : velocity + 6] = 0
             if entry.time <= data.time + _ROUND_OFF:
-                begun += 1
+                move_count += 1
                 _move(data, entry, position, velocity)
-        # sorted by time: those that have begun are the first
-        del self._moved[:begun]
-        while self._sudden and self._sudden[0].time <= data.time + _ROUND_OFF:
-            event = self._sudden.pop(0)
+        # the events are sorted by time: those that were due are the first
+        del self._moves[:move_count]
+        while self._others and self._others[0].time <= data.time + _ROUND_OFF:
+            event = self._others.pop(0)
             if isinstance(event, ControlEntry):
                 data.ctrl[self._actuators[event.actuator]] = event.value
             elif isinstance(event, PokeEntry):
@@ -226,11 +227,11 @@ def _move(
     if isinstance(entry, PlaceEntry):
         return
     data.qvel[velocity : velocity + 3] = entry.velocity
-    # a free joint keeps its angular velocity in the body's own frame
-    back = np.zeros(4)
-    mujoco.mju_negQuat(back, quaternion)
-    turning = data.qvel[velocity + 3 : velocity + 6]
-    mujoco.mju_rotVecQuat(turning, np.array(entry.angular_velocity), back)
+    # the angular velocity of a free joint is in the body's own frame
+    to_body = np.zeros(4)
+    mujoco.mju_negQuat(to_body, quaternion)
+    angular_velocity = data.qvel[velocity + 3 : velocity + 6]
+    mujoco.mju_rotVecQuat(angular_velocity, np.array(entry.angular_velocity), to_body)
 
 
 def _check_surface(

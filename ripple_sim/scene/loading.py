@@ -1,7 +1,7 @@
-"""Reading a scene: one MJCF, and one TOML file with all else.
+"""Reading a scene: an MJCF, and a TOML file with everything else.
 
 Names and numbers are checked against the model before anything is simulated. The files that an MJCF
-names are looked at before MuJoCo opens them: it would wait for ever for a FIFO.
+names are examined before MuJoCo opens them: it would wait for a FIFO for ever.
 """
 
 from __future__ import annotations
@@ -65,18 +65,18 @@ _BAD_CHARACTER = expat.errors.codes[expat.errors.XML_ERROR_BAD_CHAR_REF]
 _IMAGE_ELEMENTS = ("texture", "hfield")
 
 # MuJoCo sets up a flexcomp of so many bodies, one for each point of its grid, in this time [s]. The
-# time grows with about the number to this power, since each body added has it list all again.
+# time grows with about this power of the number, since MuJoCo lists all bodies again for each.
 _MEASURED_BODIES = 15_000
 _MEASURED_SECONDS = 30.0
 _GROWTH_POWER = 2.6
 
-# A shorter silence of MuJoCo needs no warning [s].
+# Longest time that MuJoCo may take without a warning [s].
 _MAX_SILENCE = 10.0
 
-# Change a model's specification in place, before it is compiled.
+# Changes a model's specification in place, before it is compiled.
 Edit = Callable[[mujoco.MjSpec], None]
 
-# Change a scene file's table in place, before it is checked.
+# Changes a scene file's table in place, before it is checked.
 Change = Callable[[dict[str, Any]], None]
 
 
@@ -89,18 +89,18 @@ def check_scene(scene: Scene) -> None:
     SolverError
         For an invalid material.
     """
-    # brings OpenGL, which reading a scene file can do without until here
+    # this import brings OpenGL, which reading a scene file does not need before
     from ripple_sim.render import LIGHTING
 
     own_model(scene.model)
     if not scene.targets:
         raise SceneError(f"scene {scene.name!r} has no [[ripple]] entry; name at least one geom")
     check_duration(scene.duration)
-    seen = set()
+    geoms = set()
     for entry in scene.targets:
-        if entry.geom in seen:
+        if entry.geom in geoms:
             raise SceneError(f"geom {entry.geom!r} must have one [[ripple]] entry, got two")
-        seen.add(entry.geom)
+        geoms.add(entry.geom)
         _check_target(scene.model, entry)
     named_collision_geoms(scene.model, [entry.geom for entry in scene.targets], scene.contacts)
     _check_sensors(scene)
@@ -114,7 +114,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def _warn_of_late_events(scene: Scene) -> None:
-    """Warn of each kind of event with events after the scene's end."""
+    """Warn of events after the scene's end, once for each kind of event."""
     for field in dataclasses.fields(scene.events):
         times = [event.time for event in getattr(scene.events, field.name)]
         late = [time for time in times if time >= scene.duration]
@@ -127,7 +127,7 @@ def _warn_of_late_events(scene: Scene) -> None:
 
 
 def _check_sensors(scene: Scene) -> None:
-    """Refuse sensors of one name, on no target, or without one place."""
+    """Refuse sensors that share a name, that are on no target, or that have no place or several."""
     targets = [entry.geom for entry in scene.targets]
     names = set()
     for entry in scene.sensors:
@@ -154,20 +154,21 @@ def _check_sensors(scene: Scene) -> None:
 
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
-    """Refuse a target with a wrong name, number or file."""
+    """Refuse a target with an invalid name, number or file."""
     from ripple_sim.render import LOOKS
 
     find_target(model, entry.geom)
-    for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS)):
+    for key, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS)):
         if name not in valid:
-            raise SceneError(f"{what} must be one of {', '.join(valid)}, got {name!r}")
+            raise SceneError(f"{key} must be one of {', '.join(valid)}, got {name!r}")
     check_rim(entry.rim)
     if entry.color is not None and not all(0 <= channel <= 1 for channel in entry.color):
         raise SceneError(
             f"color of geom {entry.geom!r} must be three numbers from 0 to 1 (sRGB), got "
             f"{entry.color}"
         )
-    entry.material.material(np.ones((1, 1, 1)) if entry.inside else None)
+    thickness = np.ones((1, 1, 1)) if entry.inside else None  # any, for the check
+    entry.material.material(thickness)
     for body in entry.inside:
         body.check()
     if entry.height is not None:
@@ -176,7 +177,7 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
 
 
 def _check_layer_and_maps(entry: RippleEntry) -> None:
-    """Refuse limits, images and discs of a target that cannot be."""
+    """Refuse invalid limits of the thickness, missing images, and discs without a radius."""
     least, greatest = entry.thickness_limits
     if not 0 <= least <= greatest:
         raise SceneError(
@@ -212,30 +213,20 @@ def _check_image(key: str, path: str, valid: str) -> None:
 def check_files(path: Path) -> None:
     """Make sure that an MJCF and all files that it names are regular files, as far as they exist.
 
-    Its images must not be larger than pillow allows. A flex that takes MuJoCo long to set up is
-    warned of. Raises `SceneError` naming the file.
+    Images must not be larger than Pillow allows. A warning names a flex that takes MuJoCo long to
+    set up. Raises `SceneError` naming the file.
     """
-    waiting = [path]
-    seen = set()
+    unread = [path]
+    read = set()
     folders = {path.parent}
-    while waiting:
-        xml = waiting.pop()
-        if xml in seen:
+    while unread:
+        xml = unread.pop()
+        if xml in read:
             continue
-        seen.add(xml)
-        try:
-            root = ElementTree.parse(xml).getroot()
-        except ElementTree.ParseError as error:
-            if error.code == _BAD_CHARACTER:
-                line, column = error.position
-                raise SceneError(
-                    f"the model {str(xml)!r} refers to an unknown character, at line {line}, "
-                    f"column {column}: MuJoCo would cut the text there; names must be without a "
-                    "NUL"
-                ) from error
-            continue  # MuJoCo reports the fault
-        except (OSError, ValueError, LookupError, RecursionError):
-            continue  # MuJoCo reports the fault
+        read.add(xml)
+        root = _root_of(xml)
+        if root is None:
+            continue
         for compiler in root.iter("compiler"):
             folders |= {path.parent / compiler.get(name, "") for name in _FOLDERS}
         for element in root.iter():
@@ -243,9 +234,28 @@ def check_files(path: Path) -> None:
                 _warn_of_many_bodies(element)
             for file in _files_of(element, {*folders, xml.parent}):
                 if element.tag == "include":
-                    waiting.append(file)
+                    unread.append(file)
                 elif element.tag in _IMAGE_ELEMENTS and file.name.lower().endswith(".png"):
                     open_image(SceneError, file, element.tag).close()
+
+
+def _root_of(xml: Path) -> ElementTree.Element | None:
+    """Root element of an XML file; None if it cannot be read, since MuJoCo reports the fault.
+
+    Raises `SceneError` if the file refers to a NUL, at which MuJoCo would cut the text.
+    """
+    try:
+        return ElementTree.parse(xml).getroot()
+    except ElementTree.ParseError as error:
+        if error.code == _BAD_CHARACTER:
+            line, column = error.position
+            raise SceneError(
+                f"the model {str(xml)!r} refers to an unknown character, at line {line}, column "
+                f"{column}: MuJoCo would cut the text there; names must be without a NUL"
+            ) from error
+        return None
+    except (OSError, ValueError, LookupError, RecursionError):
+        return None
 
 
 def _files_of(element: ElementTree.Element, folders: set[Path]) -> list[Path]:
@@ -310,7 +320,7 @@ def load_scene(
         Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it
         in place.
     seed : int, optional
-        In place of the one of the file's `[random]`.
+        Seed in place of the one in the file's `[random]`.
     change : callable, optional
         Called with the file's table, of dictionaries and lists, before it is checked, to change it
         in place.
@@ -336,16 +346,16 @@ def load_scene(
                 "leave the seed out, or write what is to vary under [random]"
             )
         random = msgspec.structs.replace(random, seed=seed)
-    of_model = [entry.geom for entry in content.ripple if entry.look == MODEL_LOOK]
-    model, shifts = load_model(path.parent / content.model, random, edit, of_model)
+    painted_geoms = [entry.geom for entry in content.ripple if entry.look == MODEL_LOOK]
+    model, shifts = load_model(path.parent / content.model, random, edit, painted_geoms)
     targets = []
     for entry in content.ripple:
         # a geom may be named in several ways
         name = target_name(model, find_target(model, entry.geom))
         targets.append(msgspec.structs.replace(entry.located(path.parent), geom=name))
     content.ripple = targets
-    moved: list[DropEntry | ThrowEntry] = [*content.drop, *content.throw]
-    for event in moved:
+    moves: list[DropEntry | ThrowEntry] = [*content.drop, *content.throw]
+    for event in moves:
         if event.position is not None and event.body in shifts:
             event.position = tuple(np.add(event.position, shifts[event.body]).tolist())
     return scene_of(path.stem, model, content)
@@ -379,7 +389,10 @@ def scene_of(
 
 
 def _with_typical_hit(model: mujoco.MjModel, entry: RippleEntry, content: SceneFile) -> RippleEntry:
-    """A target with what its preset "suited" leaves out found from the model."""
+    """A target whose preset "suited", if it has that one, has all parameters.
+
+    Those that the scene file leaves out are found from the model.
+    """
     preset = entry.material.preset
     preset = PresetEntry(name=preset) if isinstance(preset, str) else preset
     if preset is None or preset.name != "suited":
@@ -387,7 +400,7 @@ def _with_typical_hit(model: mujoco.MjModel, entry: RippleEntry, content: SceneF
     parameters = given_fields(preset, without="name")
     can_ease = not content.two_way and entry.pulse == "contact"
     if not parameters and can_ease and entry.material.density is None:
-        # the model chooses all of the material, as without a preset: rings that are seen
+        # the model chooses the whole material, as without a preset: rings that can be seen
         preset = None
     else:
         if not {"size", "hit"} <= set(parameters):
@@ -405,7 +418,8 @@ def load_model(
 ) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
     """Compile an MJCF file; also return how far each of its bodies was shifted at random [m].
 
-    The geoms of `looks_of_files` get the materials of their mesh files, see `paint_from_files`.
+    The geoms named in `looks_of_files` get the materials of their mesh files, see
+    `paint_from_files`.
 
     Raises `SceneError` if the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the
     randomisation is invalid.
@@ -420,7 +434,7 @@ def load_model(
     with warnings.catch_warnings(record=True) as caught, refusal_of(repr(str(path))):
         warnings.simplefilter("always")
         spec = mujoco.MjSpec.from_file(str(path))
-        # the compiler fills in missing values
+        # before the compiler fills in missing values
         keys = [(key.name, len(key.qpos)) for key in spec.keys]
         shifts = {} if random is None else randomize(spec, random)
         for note in paint_from_files(spec, looks_of_files):
@@ -456,7 +470,7 @@ def refusal_of(name: str) -> Iterator[None]:
         yield
     except ValueError as error:
         reason = " ".join(str(error).split())
-        # by default it takes as much as all bodies in one heap would need
+        # by default MuJoCo allocates as much as all bodies in one heap would need
         if "allocate memory" in reason:
             reason += '; name in the MJCF how much it may take, such as <size memory="4G"/>'
         raise SceneError(f"MuJoCo refuses {name}: {reason}") from error

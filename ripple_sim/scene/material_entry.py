@@ -19,8 +19,8 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
 from ripple_sim.solver.operator.presets import LAWS, PRESETS
 
-# Advice in messages.
-_LAYER = (
+# Advice for targets of which only a layer ripples.
+_LAYER_ADVICE = (
     "write preset = {name = 'layer', modulus = ...} or another of a layer under [ripple.material]"
 )
 
@@ -76,15 +76,15 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
         Raises `SceneError` for an unknown preset, a parameter that it does not take, or a missing
         one.
         """
-        given = given_fields(self, without="name")
+        parameters = given_fields(self, without="name")
         if thickness is not None:
             if _law(self.name) not in ("layer", "jelly"):
                 raise SceneError(
                     "[[ripple.inside]] needs a material with a layer, not the preset "
-                    f"{self.name!r}; {_LAYER}"
+                    f"{self.name!r}; {_LAYER_ADVICE}"
                 )
-            given["thickness"] = thickness
-        return preset_material(self.name, given)
+            parameters["thickness"] = thickness
+        return preset_material(self.name, parameters)
 
 
 def _law(name: str) -> str:
@@ -94,13 +94,13 @@ def _law(name: str) -> str:
     return PRESETS[name].law if name in PRESETS else name
 
 
-def preset_material(name: str, given: dict[str, Any]) -> Material:
-    """Material of a preset, with parameters that are given.
+def preset_material(name: str, values: dict[str, Any]) -> Material:
+    """Material of a preset, with values of its parameters.
 
     Raises `SceneError` for an unknown preset, a parameter that it does not take, or a missing one.
     """
     parameters = inspect.signature(getattr(Material, _law(name))).parameters
-    for key in given:
+    for key in values:
         if key not in parameters:
             raise SceneError(
                 f"the preset {name!r} has no parameter {key!r}; its parameters are "
@@ -108,12 +108,12 @@ def preset_material(name: str, given: dict[str, Any]) -> Material:
             )
     for key, parameter in parameters.items():
         is_needed = name not in PRESETS and parameter.default is inspect.Parameter.empty
-        if is_needed and key not in given:
+        if is_needed and key not in values:
             raise SceneError(
                 f"the preset {name!r} needs {key}: write {name},{key}=..., or in a scene file "
                 f"preset = {{name = {name!r}, {key} = ...}}"
             )
-    return Material.preset(name, **given)
+    return Material.preset(name, **values)
 
 
 class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -154,32 +154,30 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
         """
         preset = PresetEntry(name=self.preset) if isinstance(self.preset, str) else self.preset
         if preset is None and thickness is not None:
-            raise SceneError(f"[[ripple.inside]] needs a layer; {_LAYER}")
-        coefficients = given_fields(self, without="preset")
-        numbers = {
-            name: value for name, value in coefficients.items() if isinstance(value, int | float)
-        }
-        white = {name: entry.high for name, entry in self.maps().items()}
-        return dataclasses.replace(
-            Material() if preset is None else preset.material(thickness), **numbers, **white
-        )
+            raise SceneError(f"[[ripple.inside]] needs a layer; {_LAYER_ADVICE}")
+        base = Material() if preset is None else preset.material(thickness)
+        coefficients = {name: entry.high for name, entry in self.maps().items()}
+        for name, value in given_fields(self, without="preset").items():
+            if isinstance(value, int | float):
+                coefficients[name] = value
+        return dataclasses.replace(base, **coefficients)
 
     def maps(self) -> dict[str, MapEntry]:
         """The coefficients that are maps."""
-        return {
-            name: value if isinstance(value, MapEntry) else MapEntry(value)
-            for name, value in given_fields(self, without="preset").items()
-            if isinstance(value, str | MapEntry)
-        }
+        maps = {}
+        for name, value in given_fields(self, without="preset").items():
+            if isinstance(value, str):
+                maps[name] = MapEntry(value)
+            elif isinstance(value, MapEntry):
+                maps[name] = value
+        return maps
 
     def located(self, folder: Path) -> MaterialEntry:
-        """The same with the images' paths made relative to a folder."""
-        replace = msgspec.structs.replace
-        maps = self.maps()
-        located = {
-            name: replace(texture, map=str(folder / texture.map)) for name, texture in maps.items()
-        }
-        return replace(self, **located)
+        """The same material, with the paths of its images relative to a folder."""
+        maps = {}
+        for name, entry in self.maps().items():
+            maps[name] = msgspec.structs.replace(entry, map=str(folder / entry.map))
+        return msgspec.structs.replace(self, **maps)
 
 
 class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
@@ -197,13 +195,13 @@ class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
     poisson: float | None = None
 
 
-# Names of all coefficients.
+# Names of all coefficients: those of the class above.
 COEFFICIENTS = MaterialChange.__struct_fields__
 
 
 def given_fields(entry: msgspec.Struct, without: str = "") -> dict[str, Any]:
-    """The fields of a struct that are not None."""
-    # not `asdict`, which would turn maps into dictionaries
+    """The fields of a struct that are not None, but for the one named `without`."""
+    # `asdict` would turn maps into dictionaries
     fields = {}
     for name in entry.__struct_fields__:
         value = getattr(entry, name)

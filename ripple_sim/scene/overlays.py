@@ -25,7 +25,7 @@ class Request:
     heatmap : str or None
         "height" or "velocity": shown as colours on the targets, with a colour bar.
     limit : float or None
-        End of the colours, in m or m/s; None: adapts to the waves during the video.
+        End of the colours [m or m/s]; None: the colours adapt to the waves during the video.
     contacts, grid, time, energy, sensors : bool
         Arrows of the impulses at the contact points; the texel grid; a clock; a plot of the waves'
         energy, with that of bodies and both; the traces of the scene's sensors.
@@ -44,21 +44,21 @@ def parse_request(words: Iterable[str]) -> Request:
     """Read names of overlays.
 
     "height" [m] and "velocity" [m/s] may have a range, such as "height=0.02". Raises `SceneError`
-    for an unknown name, a range that is not a positive number or of an overlay without range, or
-    two heatmaps.
+    for an unknown name, a range that is not a positive number, a range of an overlay that has none,
+    or two heatmaps.
     """
-    chosen: dict[str, float | None] = {}
+    ranges: dict[str, float | None] = {}
     for word in words:
-        name, given, value = word.strip().partition("=")
+        name, equals_sign, value = word.strip().partition("=")
         if name not in NAMES:
             raise SceneError(f"there is no overlay {name!r}; overlays are {', '.join(NAMES)}")
-        if given and name not in HEATMAPS:
+        if equals_sign and name not in HEATMAPS:
             raise SceneError(
                 f"overlay {word.strip()!r}: {name} has no range; only {' and '.join(HEATMAPS)} "
                 "have one"
             )
-        chosen[name] = None
-        if given:
+        ranges[name] = None
+        if equals_sign:
             limit = math.nan
             with contextlib.suppress(ValueError):
                 limit = float(value)
@@ -67,14 +67,14 @@ def parse_request(words: Iterable[str]) -> Request:
                     f"overlay {word.strip()!r}: the range must be a positive number "
                     f"[{HEATMAPS[name]}]"
                 )
-            chosen[name] = limit
-    heatmaps = [name for name in HEATMAPS if name in chosen]
+            ranges[name] = limit
+    heatmaps = [name for name in HEATMAPS if name in ranges]
     if len(heatmaps) > 1:
         raise SceneError(
             f"overlays {' and '.join(heatmaps)} cannot both colour the surface; choose one"
         )
     return Request(
         heatmap=heatmaps[0] if heatmaps else None,
-        limit=chosen[heatmaps[0]] if heatmaps else None,
-        **{name: name in chosen for name in NAMES if name not in HEATMAPS},
+        limit=ranges[heatmaps[0]] if heatmaps else None,
+        **{name: name in ranges for name in NAMES if name not in HEATMAPS},
     )

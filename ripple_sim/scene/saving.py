@@ -14,6 +14,7 @@ from PIL import Image
 
 from .scene_file import SceneFile
 
+# First line of a saved scene file.
 _FIRST_LINE = "# Saved by `ripple-sim view`.\n"
 
 # A list of numbers, which tomli_w writes over several lines.
@@ -21,11 +22,11 @@ _NUMBERS = re.compile(r"\[\n(?: *[-+.\dein]+,\n)+ *\]")
 
 
 def write_scene(content: SceneFile, path: Path) -> None:
-    """Write the content of a scene file as TOML, without what has its default.
+    """Write the content of a scene file as TOML, without fields that have their default.
 
     Raises `OSError` if the file cannot be written.
     """
-    import tomli_w  # only here
+    import tomli_w
 
     text = _NUMBERS.sub(_in_one_line, tomli_w.dumps(_table(content)))
     path.write_text(_FIRST_LINE + text, encoding="utf-8")
@@ -64,6 +65,7 @@ def write_model(spec: mujoco.MjSpec, path: Path) -> None:
 
 
 def _in_one_line(array: re.Match[str]) -> str:
+    """A list of numbers in one line."""
     items = " ".join(array[0][1:-1].split())
     return f"[{items.removesuffix(',')}]"
 
@@ -84,15 +86,13 @@ def _obj(mesh: mujoco.MjsMesh) -> bytes:
     corners = np.reshape(mesh.userfacetexcoord, (-1, 3)) + 1
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
     lines += [f"vt {u:.9g} {v:.9g}" for u, v in places]
-    lines += [
-        "f " + " ".join(f"{vertex}/{place}" for vertex, place in zip(*triangle, strict=True))
-        for triangle in zip(triangles, corners, strict=True)
-    ]
+    for (a, b, c), (uv_a, uv_b, uv_c) in zip(triangles, corners, strict=True):
+        lines.append(f"f {a}/{uv_a} {b}/{uv_b} {c}/{uv_c}")
     return ("\n".join(lines) + "\n").encode()
 
 
 def _table(entry: msgspec.Struct) -> dict[str, Any]:
-    """The fields of a struct that have no default or another value, for TOML."""
+    """The fields of a struct that differ from their defaults, for TOML."""
     table = {}
     for field in msgspec.structs.fields(type(entry)):
         value = getattr(entry, field.name)
@@ -105,7 +105,7 @@ def _table(entry: msgspec.Struct) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """A value of a struct as TOML has it."""
+    """A value of a struct, with tables and lists for structs and tuples."""
     if isinstance(value, msgspec.Struct):
         return _table(value)
     if isinstance(value, list | tuple):

@@ -14,10 +14,10 @@ from .camera_entry import CameraEntry, check_camera
 from .events import Events
 from .scene_file import RippleEntry, SensorEntry, converted
 
-# Duration of a run, less than a day [s].
+# A run takes less than this, a day [s].
 MAX_DURATION = 86_400
 
-# Times by which a video is slower than the simulation.
+# Highest factor by which a video is slower than the simulation.
 MAX_SLOW_MOTION = 1000
 
 
@@ -54,7 +54,7 @@ class Scene:
     lighting : str
         One of `LIGHTING`: "auto", "model" or "studio", see `Renderer`.
     notes : tuple of str
-        What was done to its mesh on reading, one line each, where it was made from one.
+        What was done to the mesh on reading, one line each, if the scene was made from a mesh.
     sensors : tuple of SensorEntry
     """
 
@@ -72,7 +72,7 @@ class Scene:
 
     @property
     def contacts(self) -> dict[str, list[str]]:
-        """Geoms that collide for targets which name them, see `Ripples`."""
+        """Geoms that collide for a target, by target, if its entry names them; see `Ripples`."""
         return {entry.geom: entry.contacts for entry in self.targets if entry.contacts is not None}
 
 
@@ -94,14 +94,15 @@ def with_exposure(scene: Scene, **changes: Any) -> Scene:
     None leaves a value as it is. Raises `SceneError` if a value is invalid, or would have no
     effect.
     """
-    given = {name: value for name, value in changes.items() if value is not None}
-    camera = converted({**msgspec.structs.asdict(scene.camera), **given}, CameraEntry, "camera")
+    values = {name: value for name, value in changes.items() if value is not None}
+    fields = {**msgspec.structs.asdict(scene.camera), **values}
+    camera = converted(fields, CameraEntry, "camera")
     check_camera(scene.model, camera)
-    if "focus" in given and not camera.aperture:
+    if "focus" in values and not camera.aperture:
         raise SceneError(
             "a focus needs a lens: give the camera an aperture of more than 0 m, such as 0.05"
         )
-    if given.get("exposures", 1) > 1 and not (camera.shutter or camera.aperture):
+    if values.get("exposures", 1) > 1 and not (camera.shutter or camera.aperture):
         raise SceneError(
             f"all {camera.exposures} exposures would be the same: give the camera a shutter angle, "
             "such as 180 degrees, an aperture, such as 0.05 m, or both"

@@ -1,7 +1,7 @@
 """The TOML file of a scene: its tables, read strictly.
 
-`apply_maps` gives a target of `[[ripple]]` the maps of its material, the layer over what is inside,
-and parts without waves.
+`apply_maps` gives a target of `[[ripple]]` the maps of its material, the thickness of its layer,
+and its regions without waves.
 """
 
 from __future__ import annotations
@@ -29,8 +29,11 @@ from .material_entry import MaterialEntry
 from .target_maps import HeightEntry, InsideEntry, moved
 
 # Largest number in a file, in metres, seconds, newtons or degrees: no sensible scene has larger
-# ones, and their squares do not overflow.
+# numbers, and their squares do not overflow.
 _MAX_NUMBER = 1e12
+
+# A NUL, and halves of surrogate pairs.
+_INVALID_CHARACTERS = re.compile("[\0\ud800-\udfff]")
 
 Entry = typing.TypeVar("Entry")
 
@@ -98,7 +101,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     that are only to be heard."""
 
     def located(self, folder: Path) -> RippleEntry:
-        """The same with its files' paths made relative to a folder."""
+        """The same entry, with the paths of its files relative to a folder."""
         return msgspec.structs.replace(
             self,
             material=self.material.located(folder),
@@ -108,7 +111,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
         )
 
     def files(self) -> list[str]:
-        """Paths of what it reads, files or folders; its own paths are the same texts."""
+        """Paths of the files and folders that the entry reads, written as in the entry."""
         height = self.height or HeightEntry()
         paths = [self.still_map, height.map, height.field]
         paths += [body.mesh or body.volume for body in self.inside]
@@ -178,32 +181,33 @@ def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
 
     Raises `SceneError` with the place, the value and the expected values.
     """
-    what = f"scene file {origin!r}"
-    check_keys(table, SceneFile, what)
-    _check_values(table, "", what)
-    return converted(table, SceneFile, what)
+    title = f"scene file {origin!r}"
+    check_keys(table, SceneFile, title)
+    _check_values(table, "", title)
+    return converted(table, SceneFile, title)
 
 
-def converted(table: Any, schema: type[Entry], what: str) -> Entry:
+def converted(table: Any, schema: type[Entry], title: str) -> Entry:
     """A table read by a schema.
 
-    If the table does not fit, raises `SceneError` with `what` the table is, the key and the value.
+    If the table does not fit, raises `SceneError` with the title of the table, the key and the
+    value.
     """
     try:
         return msgspec.convert(table, schema)
     except msgspec.ValidationError as error:
         message = str(error).replace("`$.", "`")
-        words = _words_at(schema, message)
+        choices = _choices_at(schema, message)
         advice = ""
-        if words:
-            advice = f"; it must be {', '.join(map(repr, words[:-1]))} or {words[-1]!r}"
-        raise SceneError(f"{what}: {message}{advice}") from error
+        if choices:
+            advice = f"; it must be {', '.join(map(repr, choices[:-1]))} or {choices[-1]!r}"
+        raise SceneError(f"{title}: {message}{advice}") from error
 
 
-def _words_at(schema: Any, message: str) -> tuple[str, ...]:
-    """The words that a field takes, or none if it takes any.
+def _choices_at(schema: Any, message: str) -> tuple[str, ...]:
+    """The words that a field takes; empty if it takes any.
 
-    The path of the field stands at the end of a message of msgspec's.
+    The path of the field stands at the end of the message, which is msgspec's.
     """
     path = re.search(r" - at `(.*)`$", message)
     kind = schema
@@ -214,62 +218,80 @@ def _words_at(schema: Any, message: str) -> tuple[str, ...]:
     return typing.get_args(kind) if typing.get_origin(kind) is typing.Literal else ()
 
 
-def _check_values(value: Any, place: str, what: str) -> None:
-    """Refuse NaN, infinity, absurdly large numbers and texts with a NUL anywhere."""
+def _check_values(value: Any, key: str, title: str) -> None:
+    """Refuse NaN, infinity, absurdly large numbers and texts with a NUL anywhere.
+
+    `key` is the full key of the value, and `title` that of the table, for messages.
+    """
     if isinstance(value, dict):
-        for key, inner in value.items():
-            _check_values(inner, f"{place}.{key}" if place else key, what)
+        for name, inner in value.items():
+            _check_values(inner, f"{key}.{name}" if key else name, title)
     elif isinstance(value, list):
         for inner in value:
-            _check_values(inner, place, what)
-    elif isinstance(value, str) and re.search(
-        "[\0\ud800-\udfff]", value
-    ):  # the latter are halves of pairs
-        raise SceneError(f"{what}: {place} must be a name without a NUL, got {shown(value)}")
+            _check_values(inner, key, title)
+    elif isinstance(value, str) and _INVALID_CHARACTERS.search(value):
+        raise SceneError(f"{title}: {key} must be a name without a NUL, got {shown(value)}")
     elif isinstance(value, (int, float)) and not abs(value) <= _MAX_NUMBER:
         raise SceneError(
-            f"{what}: {place} must be a number up to {_MAX_NUMBER:g}, got {shown(value)}"
+            f"{title}: {key} must be a number up to {_MAX_NUMBER:g}, got {shown(value)}"
         )
 
 
 def table_of(kind: Any) -> type[msgspec.Struct] | None:
-    """The table that a field of some type may be, or one of a list of tables."""
+    """The schema of a field that holds a table or a list of tables; None for other fields."""
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         return kind
     return next(filter(None, map(table_of, typing.get_args(kind))), None)
 
 
-def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str = "") -> None:
-    """Refuse unknown keys before msgspec does, with the list of valid ones.
+def check_keys(table: Any, schema: type[msgspec.Struct], title: str, place: str = "") -> None:
+    """Refuse unknown keys before msgspec does, with the list of valid keys.
 
-    Raises `SceneError` with `what` the table is.
+    Parameters
+    ----------
+    table : dict
+        Other values are left to msgspec.
+    schema : type
+    title : str
+        Title of the whole table, for messages.
+    place : str
+        Full key of a table within it.
+
+    Raises
+    ------
+    SceneError
     """
     if not isinstance(table, dict):
         return
     fields = {field.name: field.type for field in msgspec.structs.fields(schema)}
     for key, value in table.items():
         if key not in fields:
-            where = f" in [{place}]" if place else ""
-            raise SceneError(f"{what}: unknown key {key!r}{where}; keys are {', '.join(fields)}")
+            table_name = f" in [{place}]" if place else ""
+            raise SceneError(
+                f"{title}: unknown key {key!r}{table_name}; keys are {', '.join(fields)}"
+            )
         inner = table_of(fields[key])
         inner_place = f"{place}.{key}" if place else key
         if inner is not None:
             if isinstance(value, dict) and typing.get_origin(fields[key]) is list:
                 raise SceneError(
-                    f"{what}: [{inner_place}] is one table, where there may be several; write "
+                    f"{title}: [{inner_place}] is one table, where there may be several; write "
                     f"[[{inner_place}]]"
                 )
             for item in value if isinstance(value, list) else [value]:
-                check_keys(item, inner, what, inner_place)
+                check_keys(item, inner, title, inner_place)
 
 
 def uniform_material(entry: RippleEntry) -> Material:
     """A target's material before its maps.
 
-    A material whose layer is still unknown promises nothing of wavelengths.
+    While the thickness of its layer is unknown, so is the range of wavelengths for which the
+    material holds.
     """
     material = entry.material.material()
-    return dataclasses.replace(material, wavelengths=(0.0, np.inf)) if entry.inside else material
+    if entry.inside:
+        return dataclasses.replace(material, wavelengths=(0.0, np.inf))
+    return material
 
 
 def apply_maps(ripples: Ripples, entry: RippleEntry) -> None:

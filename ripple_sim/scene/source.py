@@ -12,6 +12,7 @@ from typing import Any
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import shown
 
+# What to do with a mesh, and with a model, in place of a scene file.
 _A_MESH = (
     "a mesh, not a scene; `ripple-sim drop` drops bodies on it, and a scene file (TOML) may "
     "name a model with it"
@@ -29,7 +30,8 @@ _NO_SCENES = {
     ".xml": _A_MODEL,
 }
 
-# Most parts of a dotted key: tomllib's time grows with their square, and ours have four.
+# Largest number of parts of a dotted key: tomllib's time grows with its square. Keys of scene files
+# have four.
 _MAX_KEY_PARTS = 100
 
 
@@ -42,7 +44,7 @@ def shipped_scenes() -> list[str]:
 
 
 def scene_path(name_or_path: str | Path) -> Path:
-    """Path of a scene's TOML file, of a shipped scene's name or as it is given.
+    """Path of a scene's TOML file, from the name of a shipped scene or from the path itself.
 
     Raises `SceneError` if there is no such scene or file.
     """
@@ -67,21 +69,21 @@ def scene_path(name_or_path: str | Path) -> Path:
     )
 
 
-def read_toml(path: Path, what: str) -> dict[str, Any]:
+def read_toml(path: Path, kind: str) -> dict[str, Any]:
     """Read a TOML file.
 
     Parameters
     ----------
     path : Path
-    what : str
-        What the file is, for messages.
+    kind : str
+        Kind of the file, such as "scene file", for messages.
 
     Raises
     ------
     SceneError
         If it cannot be read or is not valid TOML.
     """
-    name = f"{what} {str(path)!r}"
+    name = f"{kind} {str(path)!r}"
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
@@ -101,5 +103,5 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise SceneError(
             f"{name} is nested too deeply; its tables have four levels at most"
         ) from error
-    except ValueError as error:  # also of a number with thousands of digits
+    except ValueError as error:  # also raised for a number with thousands of digits
         raise SceneError(f"{name} is not valid TOML: {error}") from error

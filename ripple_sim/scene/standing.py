@@ -16,7 +16,7 @@ UP_AXES = ("y", "z")
 # The target's longest edge of its bounding box [m].
 SIZE = 1.0
 
-# How high over the floor what touches the floor may be, over the size.
+# Largest height over the floor at which a vertex counts as a foot, over the size.
 _FOOT_HEIGHT = 0.02
 
 # An open mesh in one part lies down if it is thinner than this share of its longest extent, and
@@ -24,13 +24,13 @@ _FOOT_HEIGHT = 0.02
 _SHEET_THICKNESS = 1 / 3
 _MAX_SHEET_SHARE = 0.6
 
-# Thickness over size of a mesh that has none.
+# Largest thickness over size of a mesh that counts as flat.
 _FLAT_THICKNESS = 1e-6
 
-# Height of a mesh without thickness over the floor, so that waves have room below [m].
+# Height of a flat mesh over the floor, so that waves have room below [m].
 _FLAT_CLEARANCE = 0.25
 
-# Points of a surface by which its middle is found.
+# Number of points on a surface whose mean is its middle.
 _MIDDLE_POINTS = 1500
 
 # Order of a file's axes and their signs after the turn by which an axis points up.
@@ -49,7 +49,7 @@ class Standing(NamedTuple):
     V : float64 [n, 3]
         Vertices, scaled, over the origin, on z = 0 [m].
     note : str
-        What was decided against the usual, for the user; empty if nothing was.
+        For the user, if the mesh does not stand on the usual axis; otherwise empty.
     """
 
     V: NDArray[np.float64]
@@ -81,6 +81,7 @@ def stand(mesh: Mesh, up: str | None, usual: str) -> Standing:
         return Standing(_upright(mesh, thin), "" if thin == usual else note)
     standing = {axis: _upright(mesh, axis) for axis in UP_AXES}
     falls = {axis: _falls(V, mesh.F) for axis, V in standing.items()}
+    # an axis on which the mesh stands, and of two such axes the usual one
     best = min(UP_AXES, key=lambda axis: (falls[axis], axis != usual))
     return Standing(standing[best])
 
@@ -93,9 +94,10 @@ def sampled(
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
     rng = np.random.default_rng(0)
-    picked = rng.choice(len(F), count, p=areas / areas.sum())
+    triangles = rng.choice(len(F), count, p=areas / areas.sum())
     weights = rng.dirichlet((1.0, 1.0, 1.0), count)
-    return np.einsum("ij,ijk->ik", weights, V[F[picked]]), normals[picked] / areas[picked, None]
+    points = np.einsum("ij,ijk->ik", weights, V[F[triangles]])
+    return points, normals[triangles] / areas[triangles, None]
 
 
 def _thin_axis(mesh: Mesh) -> str | None:
@@ -109,11 +111,13 @@ def _thin_axis(mesh: Mesh) -> str | None:
 
 
 def _falls(V: NDArray[np.float64], F: NDArray[np.int64]) -> bool:
-    """Whether a mesh that stands falls over.
+    """Whether a mesh that stands on the floor falls over.
 
-    It does if the middle of its surface is not above what touches the floor, give or take.
+    It stands if the middle of its surface is above the area between its feet: seen from the middle,
+    no gap between their directions is half a turn or more.
     """
-    middle = sampled(V, F, _MIDDLE_POINTS)[0].mean(axis=0)[:2]
+    points, _ = sampled(V, F, _MIDDLE_POINTS)
+    middle = points.mean(axis=0)[:2]
     feet = V[V[:, 2] <= _FOOT_HEIGHT * SIZE][:, :2] - middle
     angles = np.sort(np.arctan2(feet[:, 1], feet[:, 0]))
     gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
@@ -123,12 +127,13 @@ def _falls(V: NDArray[np.float64], F: NDArray[np.int64]) -> bool:
 def _upright(mesh: Mesh, up: str) -> NDArray[np.float64]:
     """Vertices scaled, turned upright, and standing on z = 0 over the origin [m].
 
-    A mesh without thickness hovers above the floor.
+    A flat mesh hovers above the floor.
     """
     order, signs = _TURNS[up]
     V = mesh.V[:, order] * signs
     V = V * (SIZE / np.ptp(V, axis=0).max())
     low = V.min(axis=0)
     high = V.max(axis=0)
-    clearance = _FLAT_CLEARANCE if high[2] - low[2] <= _FLAT_THICKNESS * SIZE else 0.0
+    is_flat = high[2] - low[2] <= _FLAT_THICKNESS * SIZE
+    clearance = _FLAT_CLEARANCE if is_flat else 0.0
     return V - [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] - clearance]

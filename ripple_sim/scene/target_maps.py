@@ -1,9 +1,10 @@
 """Values of a target texel by texel in a scene file, beside its material.
 
-`[ripple.height]` is the shape of the surface at the beginning, also as an expression of position
-such as "0.02 * exp(-(x**2 + y**2) / 0.1**2)"; `rim` may be by region, where such expressions hold;
-`[[ripple.inside]]` is what lies under a layer, as a bone under the skin, and so how thick the layer
-is.
+- `[ripple.height]` is the shape of the surface at the beginning. It may be an expression of the
+  position, such as "0.02 * exp(-(x**2 + y**2) / 0.1**2)".
+- `rim` may be given by region; expressions of the position say where a rim is.
+- `[[ripple.inside]]` is a body under a layer, as a bone under the skin. It decides how thick the
+  layer is.
 """
 
 from __future__ import annotations
@@ -52,16 +53,17 @@ _OPERATORS: dict[type, Callable[..., Any]] = {
     ast.GtE: operator.ge,
 }
 
-# Most characters of an expression.
+# Largest number of characters in an expression.
 _MAX_LENGTH = 1000
 
 
 def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """Value of an expression of some variables, arrays of one shape.
 
-    It may hold numbers, the variables, pi, + - * / % **, parentheses, the functions of `FUNCTIONS`,
-    and one comparison at a time as the condition of `where`. Nothing of Python is run. Raises
-    `SceneError` if it holds anything else, or its value is not finite everywhere.
+    An expression consists of numbers, the variables, pi, + - * / % **, parentheses, the functions
+    of `FUNCTIONS`, and one comparison at a time as the condition of `where`. It is not run as
+    Python code. Raises `SceneError` if it holds anything else, or its value is not finite
+    everywhere.
     """
     try:
         if len(text) > _MAX_LENGTH:
@@ -70,8 +72,8 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
         with np.errstate(all="ignore"):
             value = _value(tree.body, {"pi": np.pi, **variables})
         result = np.zeros_like(next(iter(variables.values()))) + np.asarray(value, dtype=np.float64)
-    except SceneError as wrong:
-        raise SceneError(f"the expression {shown(text)} cannot be used: {wrong}") from None
+    except SceneError as error:
+        raise SceneError(f"the expression {shown(text)} cannot be used: {error}") from None
     except (SyntaxError, ValueError, RecursionError, MemoryError, TypeError) as error:
         raise SceneError(
             f"the expression {shown(text)} is not valid: {str(error).splitlines()[0]}"
@@ -82,7 +84,7 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
 
 
 def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
-    """Value of a part of an expression; raises `SceneError` with what it may not hold."""
+    """Value of a node of an expression; raises `SceneError` for a node that is not allowed."""
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return np.float64(number)
@@ -99,9 +101,13 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
             if len(arguments) != count:
                 raise SceneError(f"{name} must have {count} arguments, got {len(arguments)}")
             return function(*[_value(argument, names) for argument in arguments])
-    what = shown(ast.unparse(node))
     valid = f"numbers, {', '.join(names)}, + - * / % **, and {', '.join(FUNCTIONS)}"
-    raise SceneError(f"{what} is unknown; an expression may have {valid}")
+    raise SceneError(f"{shown(ast.unparse(node))} is unknown; an expression may have {valid}")
+
+
+def _by_axis(points: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Coordinates x, y and z of points [..., 3] as variables of an expression."""
+    return dict(zip("xyz", np.moveaxis(points, -1, 0), strict=True))
 
 
 class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -127,18 +133,18 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
     waves.height)` writes it."""
 
     def located(self, folder: Path) -> HeightEntry:
-        """The same with its paths made relative to a folder."""
+        """The same entry, with its paths relative to a folder."""
         image = None if self.map is None else str(folder / self.map)
         field = None if self.field is None else str(folder / self.field)
         return msgspec.structs.replace(self, map=image, field=field)
 
     def check(self) -> None:
         """Raise `SceneError` unless there is one shape, and the files exist."""
-        given = [key for key in ("expression", "map", "field") if getattr(self, key) is not None]
-        if len(given) != 1:
+        keys = [key for key in ("expression", "map", "field") if getattr(self, key) is not None]
+        if len(keys) != 1:
             raise SceneError(
                 "[ripple.height] must have one of expression, map, field, got "
-                f"{' and '.join(given) or 'none'}"
+                f"{' and '.join(keys) or 'none'}"
             )
         for key in ("map", "field"):
             path = getattr(self, key)
@@ -158,39 +164,38 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
         atlas = ripples[geom].atlas
         if self.expression is not None:
             places = to_body(ripples.model, find_target(ripples.model, geom), atlas.positions)
-            return evaluate(
-                self.expression, dict(zip("xyz", np.moveaxis(places, -1, 0), strict=True))
-            )
+            return evaluate(self.expression, _by_axis(places))
         if self.map is not None:
             return texture_map(atlas, self.map, self.low, self.high, self.channel)
-        path = self.field or ""
-        shape = atlas.areas.shape
-        try:
-            field = np.load(path, allow_pickle=False)
-        except (OSError, ValueError, EOFError) as error:
-            raise SceneError(f"saved field {path!r} cannot be read: {error}") from error
-        if (
-            not isinstance(field, np.ndarray)
-            or field.shape != shape
-            or field.dtype.kind not in "iuf"
-        ):
-            held = getattr(field, "shape", "no array")
-            raise SceneError(f"saved field {path!r} must hold numbers {shape}, got {held}")
-        if not np.isfinite(field).all():
-            raise SceneError(f"saved field {path!r} has heights that are not finite")
-        return field.astype(np.float64)
+        return _saved_field(self.field or "", atlas.areas.shape)
+
+
+def _saved_field(path: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """The heights in a .npy file [m], which must have a shape; raises `SceneError`."""
+    try:
+        field = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise SceneError(f"saved field {path!r} cannot be read: {error}") from error
+    # np.load gives an archive for a .npz file
+    is_array = isinstance(field, np.ndarray)
+    if not is_array or field.shape != shape or field.dtype.kind not in "iuf":
+        content = getattr(field, "shape", "no array")
+        raise SceneError(f"saved field {path!r} must hold numbers {shape}, got {content}")
+    if not np.isfinite(field).all():
+        raise SceneError(f"saved field {path!r} has heights that are not finite")
+    return field.astype(np.float64)
 
 
 def check_rim(rim: str | dict[str, str]) -> None:
     """Raise `SceneError` unless `rim` of a target is a name, or a table of conditions by name."""
     valid = RIMS if isinstance(rim, str) else RIMS[:3]
-    # a name alone holds everywhere
+    # a single name holds everywhere
     regions = {rim: "1"} if isinstance(rim, str) else rim
     for name in regions:
         if name not in valid:
             raise SceneError(f"rim must be one of {', '.join(valid)}, got {name!r}")
-    for where in regions.values():
-        evaluate(where, dict.fromkeys("xyz", np.ones(0)))
+    for condition in regions.values():
+        evaluate(condition, dict.fromkeys("xyz", np.ones(0)))
 
 
 def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
@@ -208,18 +213,19 @@ def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
                 f"rim of geom {geom!r} names regions, and it has no rim: it is closed; leave rim "
                 "out"
             )
-        places = to_body(model, find_target(model, geom), points).T
+        places = to_body(model, find_target(model, geom), points)
         names = np.full(len(points), "free", dtype="<U9")
-        for name, where in reversed(rim.items()):
-            there = evaluate(where, dict(zip("xyz", places, strict=True))) != 0
-            if not there.any():
-                low = [round(float(axis.min()), 4) for axis in places]
-                high = [round(float(axis.max()), 4) for axis in places]
+        # the first condition that holds counts: it is set last
+        for name, condition in reversed(rim.items()):
+            holds = evaluate(condition, _by_axis(places)) != 0
+            if not holds.any():
+                low = places.min(axis=0).round(4).tolist()
+                high = places.max(axis=0).round(4).tolist()
                 raise SceneError(
-                    f"rim {name!r} of geom {geom!r} is where {where!r}, which holds nowhere on its "
-                    f"rims; they lie from {low} to {high} m in the frame of its body"
+                    f"rim {name!r} of geom {geom!r} is where {condition!r}, which holds nowhere on "
+                    f"its rims; they lie from {low} to {high} m in the frame of its body"
                 )
-            names[there] = name
+            names[holds] = name
         return names
 
     return conditions
@@ -229,7 +235,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[[ripple.inside]]`: a body under the layer.
 
     The distance to the body from each texel inwards is the layer's thickness. The material's preset
-    is then one of a layer. Places are in the frame of the geom's body. Of several bodies the
+    must be one of a layer. Places are in the frame of the geom's body. Of several bodies the
     nearest counts; where no body is below, the layer is as thick as at its thickest, or as its
     limits let it be.
     """
@@ -249,7 +255,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
     """To metres, where the file is in other units. Scans are read in metres."""
 
     def located(self, folder: Path) -> InsideEntry:
-        """The same with its path made relative to a folder."""
+        """The same entry, with its path relative to a folder."""
         mesh = None if self.mesh is None else str(folder / self.mesh)
         volume = None if self.volume is None else str(folder / self.volume)
         return msgspec.structs.replace(self, mesh=mesh, volume=volume)
@@ -281,7 +287,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
 def moved(
     body: Mesh | Volume, to_atlas: Callable[[ArrayLike], NDArray[np.float64]]
 ) -> Mesh | Volume:
-    """A body where a function that moves points [..., 3] [m] puts it."""
+    """A body whose points [..., 3] [m] are moved by a function."""
     if isinstance(body, Mesh):
         return dataclasses.replace(body, V=to_atlas(body.V))
     origin = np.asarray(body.origin, dtype=np.float64)
@@ -312,9 +318,13 @@ def load_inside(
         mesh = load_mesh(path)
         return dataclasses.replace(mesh, V=scale * mesh.V)
     volume = load_volume(path, threshold, spacing, origin)
-    place = scale * np.asarray(volume.origin)
-    between = scale * np.asarray(volume.spacing)
-    return volume if scale == 1 else dataclasses.replace(volume, origin=place, spacing=between)
+    if scale == 1:
+        return volume
+    return dataclasses.replace(
+        volume,
+        origin=scale * np.asarray(volume.origin),
+        spacing=scale * np.asarray(volume.spacing),
+    )
 
 
 def _check_threshold(
