@@ -39,11 +39,11 @@ DONE = 0
 FAILED = 1
 BAD_INPUT = 2
 
-# [characters]: a longer message is cut
+# Length at which a message is cut [characters].
 _MAX_MESSAGE_LENGTH = 800
 
-# [GB]: address space of a small job with its libraries, software OpenGL and kernels. With less they
-# end the process, or report another cause.
+# Address space that a small job takes, with its libraries, software OpenGL and kernels [GB]. With
+# less the libraries end the process, or report another cause.
 _ADDRESS_SPACE_BY_COMMAND = {
     InfoCommand: 1.3,
     AtlasCommand: 1.2,
@@ -58,7 +58,7 @@ _ADDRESS_SPACE_BY_COMMAND = {
 
 _DESCRIPTION = (
     "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation. --version "
-    "tells which."
+    "prints the version."
 )
 
 
@@ -131,9 +131,11 @@ def _run(command: Any) -> int:
     except KeyboardInterrupt as ending:
         return _fail("interrupted", INTERRUPTED, ending)
     except SystemExit as ending:
-        if not (isinstance(ending.code, int) and (word := word_of(ending.code))):
+        status = ending.code if isinstance(ending.code, int) else 0
+        word = word_of(status)
+        if word is None:
             raise
-        return _fail(word, ending.code, ending)
+        return _fail(word, status, ending)
     finally:
         end_at_once()
     return DONE
@@ -232,11 +234,11 @@ def parse(argv: Sequence[str]) -> Any:
         print(f"ripple-sim {__version__}")
         return None
     if argv and not argv[0].startswith("-") and argv[0] not in COMMANDS:
-        near = _nearest(argv[0], COMMANDS)
+        suggestion = _suggestion(argv[0], COMMANDS)
         names = ", ".join(COMMANDS)
         raise RippleError(
-            f"there is no command {shown(argv[0])}{near}; commands are {names}; see ripple-sim "
-            "--help"
+            f"there is no command {shown(argv[0])}{suggestion}; commands are {names}; see "
+            "ripple-sim --help"
         )
     complaint = io.StringIO()
     try:
@@ -251,24 +253,32 @@ def parse(argv: Sequence[str]) -> Any:
     except SystemExit as ending:
         if not ending.code:
             return None
-    # tyro prints a title, a rule, the problem, a rule, and hints, in a frame if stdout is UTF-8.
-    # The text between the first two rules is the problem; help texts in it are indented by 8.
-    text = re.sub(r"\x1b\[[0-9;]*m", "", complaint.getvalue())
-    parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
-    part = parts[1] if len(parts) > 1 else text
-    said = " ".join(
-        line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)
-    ).strip()
+    problem = _problem(complaint.getvalue())
     command = f" {argv[0]}" if argv else ""
-    unknown = re.match(r"Unrecognized options: (--[\w-]+)", said)
-    near = _nearest(unknown[1], _options_of(argv[0])) if unknown and argv else ""
-    raise RippleError(f"{said.rstrip('.')}{near}; see ripple-sim{command} --help")
+    unknown = re.match(r"Unrecognized options: (--[\w-]+)", problem)
+    suggestion = ""
+    if unknown and argv:
+        suggestion = _suggestion(unknown[1], _options_of(argv[0]))
+    raise RippleError(f"{problem.rstrip('.')}{suggestion}; see ripple-sim{command} --help")
 
 
-def _nearest(word: str, words: Iterable[str]) -> str:
-    """A question with the nearest of `words`, or an empty text if none is near."""
-    near = difflib.get_close_matches(word, list(words), n=1)
-    return f" (did you mean {near[0]}?)" if near else ""
+def _problem(complaint: str) -> str:
+    """The problem that tyro complains of, in one line.
+
+    tyro prints a title, a rule, the problem, a rule, and hints, in a frame if stdout is UTF-8. The
+    text between the first two rules is the problem; help texts in it are indented by 8.
+    """
+    text = re.sub(r"\x1b\[[0-9;]*m", "", complaint)  # without colours
+    sections = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
+    section = sections[1] if len(sections) > 1 else text
+    lines = [line for line in section.splitlines() if not re.match(r"│? {9}", line)]
+    return " ".join(line.strip("│ ") for line in lines).strip()
+
+
+def _suggestion(word: str, words: Iterable[str]) -> str:
+    """A question with the one of `words` that is most like a word; empty if none is like it."""
+    matches = difflib.get_close_matches(word, list(words), n=1)
+    return f" (did you mean {matches[0]}?)" if matches else ""
 
 
 def _options_of(command: str) -> list[str]:

@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     from ripple_sim.viewer.window import Window
 
 
-# [s]: a job that ends within this time prints no progress into a pipe or a log
+# A job that ends within this time prints no progress into a pipe or a log [s].
 _SILENT_TIME = 10.0
 
-# [s]: compilations that take less are not told of
+# A summary leaves out compilations that take less than this [s].
 _MIN_COMPILE_TIME = 0.05
 
 
@@ -87,7 +87,7 @@ class ExportCommand(_SceneCommand, ExportOptions):
 
         is_scene(self.scene)
         options = ExportOptions(
-            **{each.name: getattr(self, each.name) for each in dataclasses.fields(ExportOptions)}
+            **{field.name: getattr(self, field.name) for field in dataclasses.fields(ExportOptions)}
         )
         check_options(options)  # before anything that takes time
         check_export(
@@ -105,10 +105,12 @@ class ExportCommand(_SceneCommand, ExportOptions):
             print(f"{Path(self.scene).name}: {note}", file=sys.stderr)
         with frame_progress(f"export to {self.output}", frame_count(options, scene)) as progress:
             summary = export_scene(scene, self.output, options, progress=progress)
-        size = summary.output.stat().st_size if summary.output.is_file() else 0
+        frames = "1 frame" if summary.frames == 1 else f"{summary.frames} frames"
+        size = ""
+        if summary.output.is_file():
+            size = f", {summary.output.stat().st_size / 1e6:.1f} MB"
         print(
-            f"{summary.output}: {summary.frames} {'frame' if summary.frames == 1 else 'frames'}"
-            f"{f', {size / 1e6:.1f} MB' if size else ''}\n"
+            f"{summary.output}: {frames}{size}\n"
             f"{_sound_line(summary.note)}"
             f"stages    simulation {summary.simulate_seconds:.1f} s, writing "
             f"{summary.write_seconds:.1f} s"
@@ -128,9 +130,8 @@ class _Rate(ProgressColumn):
 
         module = compiling()
         if module is None:
-            return Text(
-                f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed"
-            )
+            rate = f"{task.speed:.1f} frames/s" if task.speed else ""
+            return Text(rate, style="progress.data.speed")
         stage = stage_of(module)
         return Text(f"compiling {stage} (once): {_compile_times()[stage]:.0f} s")
 
@@ -152,13 +153,13 @@ def _progress_lines() -> Callable[[int, int], None]:
     It prints nothing until the job has taken `_SILENT_TIME`.
     """
     start = time.monotonic()
-    told = 0
+    printed_tenths = 0
 
     def report(done: int, total: int) -> None:
-        nonlocal told
+        nonlocal printed_tenths
         tenths = 10 * done // total if total else 0
-        if tenths > told and time.monotonic() - start > _SILENT_TIME:
-            told = tenths
+        if tenths > printed_tenths and time.monotonic() - start > _SILENT_TIME:
+            printed_tenths = tenths
             print(
                 f"ripple-sim: {10 * tenths} % done, {done} of {total} frames",
                 file=sys.stderr,
@@ -246,15 +247,13 @@ class _VideoCommand(_SceneCommand, VideoOptions):
         title = f"renderer {chosen_context(options).renderer}, waves {options.backend}"
         with frame_progress(title, frame_count(options)) as progress:
             summary = render_video(scene, self.output, options, progress=progress)
-        resumed = (
-            f", the first {summary.resumed_at} of them rendered before"
-            if summary.resumed_at
-            else ""
-        )
+        resumed = ""
+        if summary.resumed_at:
+            resumed = f", the first {summary.resumed_at} of them rendered before"
         compiling = ""
         if summary.compile_seconds >= _MIN_COMPILE_TIME:
-            compiled = [name for name, time in _compile_times().items() if time > _MIN_COMPILE_TIME]
-            compiling = f"compiling {', '.join(compiled)} (once) {summary.compile_seconds:.1f} s, "
+            stages = [stage for stage, time in _compile_times().items() if time > _MIN_COMPILE_TIME]
+            compiling = f"compiling {', '.join(stages)} (once) {summary.compile_seconds:.1f} s, "
         print(
             f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
             f"renderer  {summary.renderer}\n"
@@ -266,6 +265,7 @@ class _VideoCommand(_SceneCommand, VideoOptions):
         )
 
     def _run_cycles(self) -> None:
+        """Render the scene with Cycles and print a summary."""
         from ripple_sim.cycles.render import check_cycles, render_cycles
 
         check_cycles(self.options(), self.output, self.samples)  # before anything that takes time
@@ -441,11 +441,12 @@ class ViewCommand:
             from ripple_sim.viewer.page_view import view_of
 
             check_port(self.port, self.host)
-            origin = self._opened()
-            session = self._session(origin)
-            show(view_of(session, self.folder, self.resolution, origin), self.port, self.host)
+            opened = self._opened()
+            session = self._session(opened)
+            show(view_of(session, self.folder, self.resolution, opened), self.port, self.host)
 
     def _opened(self) -> Opened:
+        """The scene or the mesh that the command names."""
         from ripple_sim.viewer.opening import opened
 
         return opened(
@@ -457,10 +458,10 @@ class ViewCommand:
             wrap=self.wrap,
         )
 
-    def _session(self, origin: Opened, fps: int = 60, has_skins: bool = False) -> Session:
+    def _session(self, opened: Opened, fps: int = 60, has_skins: bool = False) -> Session:
         from ripple_sim.viewer.session import Session
 
-        return Session(origin.scene, fps=fps, resolution=self.resolution, has_skins=has_skins)
+        return Session(opened.scene, fps=fps, resolution=self.resolution, has_skins=has_skins)
 
     def _window(self, off_screen: bool) -> Window:
         from ripple_sim.viewer.window import Window

@@ -24,10 +24,10 @@ from .arguments import Gigabytes, Limit, Shard
 if TYPE_CHECKING:
     from ripple_sim.batch.run import Progress
 
-# [m]: `materials` shows the speed and decay of a wave of this length
+# `materials` shows the speed and decay of a wave of this length [m].
 _WAVELENGTH = 0.05
 
-# [s]: time between the lines of progress in a log
+# Time between the lines of progress in a log [s].
 _LOG_INTERVAL = 60.0
 
 
@@ -105,12 +105,15 @@ class MaterialsCommand:
         from ripple_sim.solver.operator.material import decay_time, phase_speed
         from ripple_sim.solver.operator.presets import PRESETS
 
-        q = 2 * math.pi / _WAVELENGTH
+        wave_number = 2 * math.pi / _WAVELENGTH  # [1/m]
         table = {}
         for name, preset in PRESETS.items():
             material = Material.preset(name)
-            facts = {"speed [m/s]": phase_speed(material, q), "decay [s]": decay_time(material, q)}
-            table[name] = facts | dataclasses.asdict(preset)
+            table[name] = {
+                "speed [m/s]": phase_speed(material, wave_number),
+                "decay [s]": decay_time(material, wave_number),
+                **dataclasses.asdict(preset),
+            }
         if self.json:
             print(json_format.dumps(table, indent=2))
             return
@@ -123,9 +126,8 @@ class MaterialsCommand:
             parameters = ", ".join(f"{key} {value:g}" for key, value in row["parameters"].items())
             print(f"{'':{width}}  {row['law']}: {parameters}")
             print(f"{'':{width}}  holds: {row['valid']}")
-            print(
-                f"{'':{width}}  source{'' if row['checked'] else ', not checked'}: {row['source']}"
-            )
+            unchecked = "" if row["checked"] else ", not checked"
+            print(f"{'':{width}}  source{unchecked}: {row['source']}")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -194,39 +196,40 @@ class BatchCommand:
 
 def progress_text(progress: Progress) -> str:
     """One line: frames, rate, time left, failures, and room taken and free on the disk."""
-    left = progress.scenes - progress.finished - progress.aside
-    parts = [f"{progress.frames} frames"]
+    items = [f"{progress.frames} frames"]
     if progress.made and progress.seconds:
-        rate = progress.made / progress.seconds
-        parts += [f"{3600 * rate:.0f} scenes/h", f"{duration_text(left / rate)} left"]
+        rate = progress.made / progress.seconds  # [scenes/s]
+        missing_scenes = progress.scenes - progress.finished - progress.aside
+        items.append(f"{3600 * rate:.0f} scenes/h")
+        items.append(f"{duration_text(missing_scenes / rate)} left")
     if progress.failures or progress.aside:
-        parts.append(f"{progress.failures} failed, {progress.aside} put aside")
-    return ", ".join(
-        [*parts, f"{progress.bytes / 1e9:.2f} GB written", f"{progress.free / 1e9:.1f} GB free"]
-    )
+        items.append(f"{progress.failures} failed, {progress.aside} put aside")
+    items.append(f"{progress.bytes / 1e9:.2f} GB written")
+    items.append(f"{progress.free / 1e9:.1f} GB free")
+    return ", ".join(items)
 
 
 def duration_text(seconds: float) -> str:
-    """A time in seconds, minutes and hours."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
+    """A time [s] in words: seconds, minutes and seconds, or hours and minutes."""
+    whole_minutes, rounded_seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(whole_minutes, 60)
     if hours:
         return f"{hours} h {minutes:02d} min"
     if minutes:
-        return f"{minutes} min {rest:02d} s"
-    return f"{rest} s"
+        return f"{minutes} min {rounded_seconds:02d} s"
+    return f"{rounded_seconds} s"
 
 
 @contextlib.contextmanager
 def batch_progress() -> Iterator[Callable[[Progress], None]]:
     """Yield a function that shows a batch's progress on stderr."""
     if not sys.stderr.isatty():
-        told = time.monotonic()
+        latest_line = time.monotonic()
 
         def log(progress: Progress) -> None:
-            nonlocal told
-            if time.monotonic() - told >= _LOG_INTERVAL:
-                told = time.monotonic()
+            nonlocal latest_line
+            if time.monotonic() - latest_line >= _LOG_INTERVAL:
+                latest_line = time.monotonic()
                 done = progress.finished + progress.aside
                 print(
                     f"{done} of {progress.scenes} scenes, {progress_text(progress)}",
@@ -239,9 +242,9 @@ def batch_progress() -> Iterator[Callable[[Progress], None]]:
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("scenes, {task.description}"))
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
         task = bars.add_task("", total=None)
-        yield lambda now: bars.update(
+        yield lambda progress: bars.update(
             task,
-            total=now.scenes,
-            completed=now.finished + now.aside,
-            description=progress_text(now),
+            total=progress.scenes,
+            completed=progress.finished + progress.aside,
+            description=progress_text(progress),
         )

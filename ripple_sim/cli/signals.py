@@ -3,13 +3,18 @@
 Unfinished files are cleaned up.
 
 Before a command begins there is nothing to clean up, and the process ends at once. Later the signal
-becomes an exception. Where that would do harm a timer tries again until it is over: within calls of
-moderngl's or LLVM's it would end in a segmentation fault; VTK swallows exceptions of what it calls
-back, or exits by itself; zarr's threads would go on to write into a folder that is being removed; a
-package may take it for an import error; Python swallows it in a finalizer; and a video that is
-being opened has nobody yet who would clean it up. A second signal ends the process at once; what is
-left is then as whole as after a kill. One that comes after the command, while the interpreter shuts
-down, changes nothing.
+becomes an exception. In some code an exception would do harm; a timer then tries again until that
+code has ended:
+
+- within calls of moderngl and LLVM it would end in a segmentation fault;
+- VTK swallows exceptions of functions that it calls back, or exits by itself;
+- zarr's threads would go on to write into a folder that is being removed;
+- a package may take the exception for an import error;
+- Python swallows exceptions in a finalizer;
+- while a video is being opened, nobody would clean it up.
+
+A second signal ends the process at once, and leaves the files behind that a kill would leave. A
+signal after the command, while the interpreter shuts down, changes nothing.
 """
 
 from __future__ import annotations
@@ -20,8 +25,12 @@ import sys
 from collections.abc import Callable
 from types import FrameType
 
+# What is printed for each signal.
 _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
-INTERRUPTED, TERMINATED, HUNG_UP = (128 + number for number in _WORDS)
+
+# Exit statuses of the signals.
+INTERRUPTED = 128 + signal.SIGINT
+TERMINATED = 128 + signal.SIGTERM
 
 # Code within which no exception is raised, by the beginnings of its dotted names.
 _NEVER_IN = (
@@ -37,12 +46,14 @@ _NEVER_IN = (
     "ripple_sim.encode.writer.open_writer",
 )
 
-_RETRY = 0.02  # [s]
+# Time until an exception is tried again [s].
+_RETRY_INTERVAL = 0.02
 
 
 def word_of(status: int) -> str | None:
-    """The word for an exit status of a signal, or None for any other."""
-    return {128 + number: word for number, word in _WORDS.items()}.get(status)
+    """The word for the exit status of a signal; None for any other status."""
+    words = {128 + number: word for number, word in _WORDS.items()}
+    return words.get(status)
 
 
 def end_at_once() -> None:
@@ -65,33 +76,42 @@ def end_in_good_order() -> None:
 def finish_undisturbed() -> None:
     """Ignore the signals from here on: the command is done, and its status stands.
 
-    While the interpreter shuts down it would give them back to the system, which ends the process
-    without a word.
+    While the interpreter shuts down, it would give the signals back to the system, which ends the
+    process without a word.
     """
     _handle(signal.SIG_IGN)
 
 
 def _handle(handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
+    """Set the handler of all signals but those that the parent process ignores."""
     for number in _WORDS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
+    """End the process with one line."""
     os.write(2, f"ripple-sim: {_WORDS[signal.Signals(number)]}\n".encode())
     os._exit(128 + number)
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    while frame is not None:  # from the innermost of the functions that are running
-        name = f"{frame.f_globals.get('__name__', '')}.{frame.f_code.co_qualname}"
-        # an exception does harm: try again
-        if frame.f_code.co_name == "__del__" or name.startswith(_NEVER_IN):
-            signal.signal(signal.SIGALRM, lambda _, then: _raise(number, then))
-            signal.setitimer(signal.ITIMER_REAL, _RETRY)
-            return
-        frame = frame.f_back
+    """Raise the exception of a signal, or try again later where it would do harm."""
+    if _does_harm_in(frame):
+        signal.signal(signal.SIGALRM, lambda _, later_frame: _raise(number, later_frame))
+        signal.setitimer(signal.ITIMER_REAL, _RETRY_INTERVAL)
+        return
     end_at_once()
     if number == signal.SIGINT:
         raise KeyboardInterrupt
     sys.exit(128 + number)
+
+
+def _does_harm_in(frame: FrameType | None) -> bool:
+    """Whether an exception would do harm in a frame or in any of its callers."""
+    while frame is not None:
+        name = f"{frame.f_globals.get('__name__', '')}.{frame.f_code.co_qualname}"
+        if frame.f_code.co_name == "__del__" or name.startswith(_NEVER_IN):
+            return True
+        frame = frame.f_back
+    return False

@@ -40,6 +40,9 @@ _FIGURES = {
     "timestep": ("time step / even grid's", ""),
 }
 
+# Quantiles of the thickness of a layer that a report has, by name.
+_THICKNESS_QUANTILES = {"least": 0.0, "q01": 0.01, "median": 0.5, "q99": 0.99, "greatest": 1.0}
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class AtlasCommand:
@@ -93,22 +96,22 @@ class AtlasCommand:
             inside = load_inside(self.inside, self.threshold, self.spacing)
         start = time.perf_counter()
         mesh = load_mesh(self.mesh, repair=self.repair, wrap=self.wrap)
-        loaded = time.perf_counter()
+        seconds = {"load": time.perf_counter() - start}
         atlas = build_atlas(
             mesh, resolution=self.resolution, method=self.method, layout=self.layout
         )
-        seconds = {"load": loaded - start, **atlas.timings}
+        seconds |= atlas.timings
         thickness = None
         if inside is not None:
-            begun = time.perf_counter()
+            start = time.perf_counter()
             thickness = thickness_map(atlas, inside)
-            seconds["thickness"] = time.perf_counter() - begun
+            seconds["thickness"] = time.perf_counter() - start
         if self.output is not None:
             atlas.save(self.output, self.overwrite)
         if self.plot is not None:
-            begun = time.perf_counter()
+            start = time.perf_counter()
             self._plot(self.plot, atlas, thickness)
-            seconds["plot"] = time.perf_counter() - begun
+            seconds["plot"] = time.perf_counter() - start
         report = atlas_report(self.mesh, atlas, self.method, seconds, thickness)
         print(json_format.dumps(report, indent=2) if self.json else report_text(report))
 
@@ -152,12 +155,14 @@ class AtlasCommand:
             plot_thickness(atlas, thickness, path, title=self.mesh.stem, subtitle=subtitle, up=up)
 
 
-def _check_other(path: Path, read: Path | None, what: str) -> None:
-    """Check that `path` is not the file that is read."""
+def _check_other(output: Path, source: Path | None, content: str) -> None:
+    """Check that an output is not the file that is read, which holds `content`."""
     from ripple_sim.solver import AtlasError
 
-    if read is not None and path.exists() and read.exists() and path.samefile(read):
-        raise AtlasError(f"cannot write {path}: it is {what} itself; name another file")
+    if source is None or not (output.exists() and source.exists()):
+        return
+    if output.samefile(source):
+        raise AtlasError(f"cannot write {output}: it is {content} itself; name another file")
 
 
 def atlas_report(
@@ -175,13 +180,10 @@ def atlas_report(
     the thickness of a layer [m], and `seconds` the wall time of each stage [s].
     """
     mesh = atlas.mesh
-    known: dict[str, Any] = {}
+    optional: dict[str, Any] = {}
     if thickness is not None:
-        names = ("least", "q01", "median", "q99", "greatest")
-        shares = (0, 0.01, 0.5, 0.99, 1)
-        known = {
-            "thickness": dict(zip(names, np.quantile(thickness, shares).tolist(), strict=True))
-        }
+        quantiles = np.quantile(thickness, list(_THICKNESS_QUANTILES.values())).tolist()
+        optional["thickness"] = dict(zip(_THICKNESS_QUANTILES, quantiles, strict=True))
     return {
         "mesh": str(path),
         "vertices": len(mesh.V),
@@ -195,43 +197,38 @@ def atlas_report(
         "method": method if atlas.layout == "cube" else None,
         "charts": list(atlas.texels.shape),
         "quality": atlas.quality(),
-        **known,
+        **optional,
         "seconds": seconds,
     }
 
 
 def charts_text(shape: Sequence[int], method: str | None) -> str:
     """Describe charts of shape (C, n, n) as text, and the sphere map of the cube layout."""
-    return (
-        f"{' x '.join(map(str, shape))} texels, "
-        f"{'patches' if method is None else f'{method} sphere map'}"
-    )
+    layout = "patches" if method is None else f"{method} sphere map"
+    return f"{' x '.join(map(str, shape))} texels, {layout}"
 
 
 def report_text(report: dict[str, Any]) -> str:
     """Format a report as text."""
+    size = " x ".join(f"{length:.4g}" for length in report["size"])
     rows = [
         ("mesh", f"{report['vertices']} vertices, {report['triangles']} triangles"),
-        ("size", f"{' x '.join(f'{x:.4g}' for x in report['size'])} m"),
+        ("size", f"{size} m"),
         ("area", f"{report['area']:.6g} m^2"),
         ("volume", f"{report['volume']:.6g} m^3"),
-        *(("note", note) for note in report["notes"]),
-        ("atlas", charts_text(report["charts"], report["method"])),
-        *(
-            (_FIGURES[name][0], f"{value:.6g} {_FIGURES[name][1]}".rstrip())
-            for name, value in report["quality"].items()
-        ),
-        *(
-            (f"thickness, {name}", f"{metres:.6g} m")
-            for name, metres in report.get("thickness", {}).items()
-        ),
-        *(
-            (f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s")
-            for stage, seconds in report["seconds"].items()
-        ),
     ]
-    width = max(len(name) for name, _ in rows)
-    return "\n".join([report["mesh"], *(f"{name:<{width}}  {value}" for name, value in rows)])
+    rows += [("note", note) for note in report["notes"]]
+    rows.append(("atlas", charts_text(report["charts"], report["method"])))
+    for name, value in report["quality"].items():
+        label, unit = _FIGURES[name]
+        rows.append((label, f"{value:.6g} {unit}".rstrip()))
+    for name, thickness in report.get("thickness", {}).items():
+        rows.append((f"thickness, {name}", f"{thickness:.6g} m"))
+    for stage, seconds in report["seconds"].items():
+        rows.append((f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s"))
+    width = max(len(label) for label, _ in rows)
+    lines = [f"{label:<{width}}  {value}" for label, value in rows]
+    return "\n".join([report["mesh"], *lines])
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -275,29 +272,28 @@ class ModesCommand:
             check_plot_path(self.plot, self.overwrite)
         material = preset_material(*self.material)
         atlas = build_atlas(load_mesh(self.mesh), resolution=self.resolution, layout=self.layout)
-        found = modes(atlas, material, self.count, rim=self.rim)
+        spectrum = modes(atlas, material, self.count, rim=self.rim)
         if self.plot is not None:
-            self._plot(self.plot, atlas, found)
-        first = found.frequencies[0]
+            self._plot(self.plot, atlas, spectrum)
+        lowest = spectrum.frequencies[0]
         report = [  # as JSON can hold them, in [Hz] and [s]
             {
                 "frequency": float(frequency),
-                "ratio": float(frequency / first) if first else None,
+                "ratio": float(frequency / lowest) if lowest else None,
                 "decay_time": float(decay) if np.isfinite(decay) else None,
             }
-            for frequency, decay in zip(found.frequencies, found.decay_times, strict=True)
+            for frequency, decay in zip(spectrum.frequencies, spectrum.decay_times, strict=True)
         ]
         if self.json:
             print(json_format.dumps(report, indent=2))
             return
         print("mode  frequency [Hz]   ratio  falls to 1/e in [s]")
         for number, mode in enumerate(report, 1):
-            ratio, last = (
-                "-" if mode[key] is None else f"{mode[key]:.4g}" for key in ("ratio", "decay_time")
-            )
-            print(f"{number:4}  {mode['frequency']:14.5g}  {ratio:>6}  {last}")
+            ratio = _number_or_dash(mode["ratio"])
+            decay_time = _number_or_dash(mode["decay_time"])
+            print(f"{number:4}  {mode['frequency']:14.5g}  {ratio:>6}  {decay_time}")
 
-    def _plot(self, path: Path, atlas: Atlas, found: Modes) -> None:
+    def _plot(self, path: Path, atlas: Atlas, spectrum: Modes) -> None:
         from ripple_sim.figures.mode_plot import plot_modes
         from ripple_sim.scene.standing import usual_up
 
@@ -305,4 +301,10 @@ class ModesCommand:
         rim = "" if atlas.mesh.closed else f", {self.rim} rim"
         subtitle = f"{self.material[0]}, {size} m{rim}; red is outwards, blue is inwards"
         up = self.up or usual_up(self.mesh)
-        plot_modes(atlas, found, path, title=f"Modes of {self.mesh.stem}", subtitle=subtitle, up=up)
+        title = f"Modes of {self.mesh.stem}"
+        plot_modes(atlas, spectrum, path, title=title, subtitle=subtitle, up=up)
+
+
+def _number_or_dash(value: float | None) -> str:
+    """A number with four digits; a dash for None."""
+    return "-" if value is None else f"{value:.4g}"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.cli import DropCommand, RenderCommand, ViewCommand, arguments, parse
+from ripple_sim.cli import DropCommand, RenderCommand, ViewCommand, parse, parsers
 from ripple_sim.overlay import operators
 from ripple_sim.scene import drop, drop_view
 from ripple_sim.solver.layouts import build
@@ -24,9 +24,9 @@ from ripple_sim.video import VideoOptions
         ("angle", "360", 360.0),
         ("diameter", "0", 0.0),
         ("focus", "2nd", "2nd"),
-        ("overlay", "height=0.02, contacts ,time", ("height=0.02", "contacts", "time")),
-        ("overlay", "", ()),
-        ("overlay", "  ", ()),
+        ("names", "height=0.02, contacts ,time", ("height=0.02", "contacts", "time")),
+        ("names", "", ()),
+        ("names", "  ", ()),
         ("view", "left", "left"),
         ("view", "-40", -40.0),
         ("elevation", "-90", -90.0),
@@ -37,7 +37,7 @@ from ripple_sim.video import VideoOptions
 def test_a_word_is_converted_to_a_value_of_the_right_type(
     parse: str, word: str, value: object
 ) -> None:
-    read = getattr(arguments, f"parse_{parse}")(word)
+    read = getattr(parsers, f"parse_{parse}")(word)
     assert read == value
     assert type(read) is type(value)
 
@@ -72,15 +72,15 @@ def test_invalid_words_are_quoted_with_the_expected_ones(
 ) -> None:
     for word in words:
         with pytest.raises(ValueError, match="must be") as refusal:
-            getattr(arguments, f"parse_{parse}")(word)
+            getattr(parsers, f"parse_{parse}")(word)
         assert repr(word) in str(refusal.value)
         assert valid in str(refusal.value)
 
 
 def test_choices_of_options_are_those_of_the_modules_that_use_them() -> None:
-    assert (arguments.UP_AXES, arguments.BASELINES) == (drop.UP_AXES, operators.BASELINES)
-    assert tuple(drop_view.VIEWS) == arguments.VIEWS
-    assert (arguments.LAYOUTS, arguments.RIMS) == (build.LAYOUTS, plate_rim.RIMS)
+    assert (parsers.UP_AXES, parsers.BASELINES) == (drop.UP_AXES, operators.BASELINES)
+    assert tuple(drop_view.VIEWS) == parsers.VIEWS
+    assert (parsers.LAYOUTS, parsers.RIMS) == (build.LAYOUTS, plate_rim.RIMS)
 
 
 WORDS = {
