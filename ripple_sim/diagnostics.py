@@ -27,11 +27,16 @@ from ripple_sim.solver.backends.choice import auto_backend
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import DRAWING_THREADS, shared_context
 
+# Where libglvnd looks for vendor files.
 _VENDOR_FOLDERS = ("/etc/glvnd/egl_vendor.d", "/usr/share/glvnd/egl_vendor.d")
+# Libraries that OpenGL needs, and their packages on Debian and Ubuntu.
 _LIBRARIES = {"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1"}
+# The file in which NVIDIA's driver tells its version.
 _NVIDIA_VERSION = Path("/proc/driver/nvidia/version")
+# Advice for containers.
 _CONTAINER = "in a container, start that with NVIDIA_DRIVER_CAPABILITIES=all"
 
+# Packages whose versions are reported.
 PACKAGES = (
     "ripple-sim",
     "mujoco",
@@ -70,16 +75,18 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[s
         return (
             list(_library_problems()) or list(_vendor_problems()) or list(_device_problems(devices))
         )
-    found = list(_device_problems(devices))
-    if (devices / "nvidia0").exists() and not any(
-        "nvidia" in (_library_of(f) or "") for f in _vendor_files()[0]
-    ):
-        found.append(
+    problems = list(_device_problems(devices))
+    vendor_files, _ = _vendor_files()
+    vendor_libraries = [_library_of(file) or "" for file in vendor_files]
+    has_nvidia_library = any("nvidia" in library for library in vendor_libraries)
+    if (devices / "nvidia0").exists() and not has_nvidia_library:
+        problems.append(
             "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in "
             f"software: {_install_nvidia()}"
         )
-    if found or any(devices.glob("dri/renderD*")) or any(devices.glob("nvidia[0-9]*")):
-        return found
+    has_gpu = any(devices.glob("dri/renderD*")) or any(devices.glob("nvidia[0-9]*"))
+    if problems or has_gpu:
+        return problems
     return [
         f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or "
         f"{devices}/nvidia*): nothing to fix; rendering is faster on a machine with a GPU (in a "
@@ -88,6 +95,7 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[s
 
 
 def _library_problems() -> Iterator[str]:
+    """Libraries that are missing or cannot be loaded."""
     for library, package in _LIBRARIES.items():
         try:
             ctypes.CDLL(library)
@@ -102,15 +110,17 @@ def _library_problems() -> Iterator[str]:
 
 
 def _vendor_problems() -> Iterator[str]:
-    files, where = _vendor_files()
+    """Vendor files that are missing, damaged, or name a library that cannot be loaded."""
+    files, search_path = _vendor_files()
     if not files:
         yield (
-            f"there is no EGL vendor file (*.json) in {where}: apt-get install libegl-mesa0 "
+            f"there is no EGL vendor file (*.json) in {search_path}: apt-get install libegl-mesa0 "
             "libgl1-mesa-dri; for an NVIDIA GPU install libnvidia-gl of the driver's version, "
             f"or, {_CONTAINER}"
         )
     for file in files:
-        if (library := _library_of(file)) is None:
+        library = _library_of(file)
+        if library is None:
             yield (
                 f"the EGL vendor file {file} is damaged: reinstall the package it belongs to: "
                 f"dpkg -S {file}"
@@ -125,6 +135,7 @@ def _vendor_problems() -> Iterator[str]:
 
 
 def _device_problems(devices: Path) -> Iterator[str]:
+    """Render nodes of GPUs that the user may not open."""
     for node in sorted(devices.glob("dri/renderD*")):
         if not os.access(node, os.R_OK | os.W_OK, effective_ids=True):
             number = node.stat().st_gid
@@ -139,29 +150,27 @@ def _device_problems(devices: Path) -> Iterator[str]:
 
 
 def _install_nvidia() -> str:
-    version = (
-        re.search(r"\b(\d{3})\.\d+", _NVIDIA_VERSION.read_text())
-        if _NVIDIA_VERSION.exists()
-        else None
-    )
-    package = (
-        f"libnvidia-gl-{version[1]}"
-        if version
-        else "libnvidia-gl-NNN, where NNN is the driver's version"
-    )
+    """How to install the OpenGL libraries of NVIDIA's driver."""
+    version = None
+    if _NVIDIA_VERSION.exists():
+        version = re.search(r"\b(\d{3})\.\d+", _NVIDIA_VERSION.read_text())
+    package = "libnvidia-gl-NNN, where NNN is the driver's version"
+    if version is not None:
+        package = f"libnvidia-gl-{version[1]}"
     return f"apt-get install {package}; {_CONTAINER}"
 
 
 def _vendor_files() -> tuple[list[Path], str]:
     """The vendor files that libglvnd reads, and its search path."""
-    if names := os.environ.get("__EGL_VENDOR_LIBRARY_FILENAMES"):
+    names = os.environ.get("__EGL_VENDOR_LIBRARY_FILENAMES")
+    if names:
         return [Path(name) for name in names.split(":")], f"__EGL_VENDOR_LIBRARY_FILENAMES={names}"
-    folders = os.environ.get("__EGL_VENDOR_LIBRARY_DIRS")
-    places = folders.split(":") if folders else list(_VENDOR_FOLDERS)
+    user_folders = os.environ.get("__EGL_VENDOR_LIBRARY_DIRS")
+    folders = user_folders.split(":") if user_folders else list(_VENDOR_FOLDERS)
     files: list[Path] = []
-    for place in places:
-        files += Path(place).glob("*.json")
-    return sorted(files), " or ".join(places)
+    for folder in folders:
+        files += Path(folder).glob("*.json")
+    return sorted(files), " or ".join(folders)
 
 
 def _library_of(file: Path) -> str | None:
@@ -219,9 +228,12 @@ def collect() -> dict[str, Any]:
             name: getattr(context, name)
             for name in ("renderer", "vendor", "version", "software", "computes")
         }
-    findings = find_problems(opengl["software"] if opengl else None)
+    problems = find_problems(opengl["software"] if opengl else None)
+    measurement = ""
     if opengl is not None:
-        findings += find_drawing_threads(opengl["renderer"])
+        problems += find_drawing_threads(opengl["renderer"])
+        if opengl["computes"] and not opengl["software"]:
+            measurement = str(measured(context))
     return {
         "versions": {
             "python": platform.python_version(),
@@ -231,34 +243,38 @@ def collect() -> dict[str, Any]:
         "processors": os.cpu_count() or 1,
         "opengl": opengl,
         "backend": auto_backend(),
-        "measured": str(measured(context))
-        if opengl and opengl["computes"] and not opengl["software"]
-        else "",
-        "advice": "\n".join(findings) or failure,
+        "measured": measurement,
+        "advice": "\n".join(problems) or failure,
     }
 
 
 def as_text(info: dict[str, Any]) -> str:
     """Format the report as text."""
-    gl = info["opengl"]
-    where = "on the CPU" if info["backend"] == "cpu" else "on the GPU, in OpenGL compute shaders"
-    rows = {
-        **{name: version or "not installed" for name, version in info["versions"].items()},
-        "system": f"{info['system']}, {info['processors']} processors",
-        "OpenGL": f"{gl['version']}, {gl['vendor']}" if gl else "none",
-        "renderer": f"{gl['renderer']} ({'software' if gl['software'] else 'hardware'})"
-        if gl
-        else "none: rendering is impossible",
-        "waves": f"{info['backend']} (auto: {where})",
-        **({"measured": f"nine substeps: {info['measured']}"} if info["measured"] else {}),
-    }
+    rows = {name: version or "not installed" for name, version in info["versions"].items()}
+    rows["system"] = f"{info['system']}, {info['processors']} processors"
+    opengl = info["opengl"]
+    if opengl is None:
+        rows["OpenGL"] = "none"
+        rows["renderer"] = "none: rendering is impossible"
+    else:
+        kind = "software" if opengl["software"] else "hardware"
+        rows["OpenGL"] = f"{opengl['version']}, {opengl['vendor']}"
+        rows["renderer"] = f"{opengl['renderer']} ({kind})"
+    on_cpu = info["backend"] == "cpu"
+    device = "on the CPU" if on_cpu else "on the GPU, in OpenGL compute shaders"
+    rows["waves"] = f"{info['backend']} (auto: {device})"
+    if info["measured"]:
+        rows["measured"] = f"nine substeps: {info['measured']}"
     width = max(map(len, rows))
     lines = [f"{name:<{width}}  {value}" for name, value in rows.items()]
-    return "\n".join([*lines, *(["", info["advice"]] if info["advice"] else [])])
+    if info["advice"]:
+        lines += ["", info["advice"]]
+    return "\n".join(lines)
 
 
 def _version(name: str) -> str | None:
-    if name == "ripple-sim":  # of the source tree, whose metadata is of when it was set up
+    """Version of a package; None if it is not installed."""
+    if name == "ripple-sim":  # the metadata of a source tree may be older than the tree
         return __version__
     if name == "mujoco":  # installed under that name, or as `mujoco-core`
         return mujoco.__version__

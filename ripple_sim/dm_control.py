@@ -89,16 +89,16 @@ def _render_flag(flag: Any) -> int:
 
 @contextlib.contextmanager
 def _overridden(scene: mujoco.MjvScene, flags: Mapping[Any, bool]) -> Iterator[None]:
-    """Give some of a scene's flags other values for a while."""
-    usual = scene.flags.copy()
+    """Within the context some of a scene's flags have other values."""
+    flags_before = scene.flags.copy()
     for flag, value in flags.items():
         scene.flags[_render_flag(flag)] = value
     yield
-    scene.flags[:] = usual
+    scene.flags[:] = flags_before
 
 
 def _refuse_with_surfaces(**options: Any) -> None:
-    """Raise if an option is given that dm_control takes for colours alone."""
+    """Raise if an option is given that dm_control has for colours alone."""
     for name, value in options.items():
         if value:
             raise RenderError(
@@ -106,16 +106,17 @@ def _refuse_with_surfaces(**options: Any) -> None:
             )
 
 
-def _follow(physics: Any, ripples: Ripples, **looks: Any) -> None:
+def _follow(physics: Any, ripples: Ripples, **renderer_options: Any) -> None:
     """Have a physics drive the ripples and draw with them.
 
-    `looks` are keyword arguments of `RippleRenderer`.
+    `renderer_options` are keyword arguments of `RippleRenderer`.
     """
 
     @functools.cache
     def renderer_of(height: int, width: int) -> RippleRenderer:
-        return RippleRenderer(physics.model, ripples, height, width, **looks)
+        return RippleRenderer(physics.model, ripples, height, width, **renderer_options)
 
+    # the arguments are those of `Physics.render`, in their order
     def rippling_render(
         height: int = 240,
         width: int = 320,

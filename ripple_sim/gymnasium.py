@@ -158,7 +158,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         self._looks = looks
         self._options = options
         self._lighting = lighting
-        # of MuJoCo's free camera [m], once it is used
+        # where MuJoCo's free camera looks [m], once it is used
         self._lookat: NDArray[np.float64] | None = None
         self._renders_by_itself = True
         self._in_place = None
@@ -171,10 +171,11 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
 
     def _space_with_sensors(self) -> gymnasium.spaces.Dict:
         """The environment's space of observations, with those of the sensors beside it."""
-        own = self.env.observation_space
-        spaces = (
-            dict(own.spaces) if isinstance(own, gymnasium.spaces.Dict) else {"observation": own}
-        )
+        env_space = self.env.observation_space
+        if isinstance(env_space, gymnasium.spaces.Dict):
+            spaces = dict(env_space.spaces)
+        else:
+            spaces = {"observation": env_space}
         for name, blocks in self._blocks.items():
             if name in spaces:
                 raise SceneError(
@@ -219,7 +220,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             self._in_place = RenderedInPlace(model, self.ripples, self._looks, self._lighting)
         if not self._renders_by_itself:
             return self._drawn_from_outside(self._in_place)
-        before = self._in_place.frames
+        frames_before = self._in_place.frames
         problem: str | None = (
             "returns frames that neither Gymnasium's MujocoRenderer nor mujoco.Renderer has drawn"
         )
@@ -228,13 +229,13 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
                 frame = self.env.render()
         except (gymnasium.error.Error, RippleError):
             raise
-        except NotImplementedError:  # it has none
+        except NotImplementedError:  # the environment has no render of its own
             problem = None
         except Exception as error:
-            if self._in_place.frames > before:
+            if self._in_place.frames > frames_before:
                 raise
             problem = f"fails ({type(error).__name__}: {error})"
-        if self._in_place.frames > before:
+        if self._in_place.frames > frames_before:
             return frame
         self._renders_by_itself = False
         if problem is not None:
@@ -265,21 +266,22 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         return frames_of(renderer, self.render_mode)
 
     def _couple(self) -> None:
+        """Make the ripples of the environment's present model, and their sensors."""
         model, _ = model_and_data(self.unwrapped)
         self.ripples = Ripples(model, self._materials, **self._options)
         if self._in_place is not None:
             self._in_place.close()
         self._in_place = None
         self._blocks.clear()
-        control = float(getattr(self.unwrapped, "dt", 0.0))
+        control_step = float(getattr(self.unwrapped, "dt", 0.0))  # [s]
         for name, arguments in _sensor_arguments(model, self._sensor_requests).items():
-            others = {key: value for key, value in arguments.items() if key != "geom"}
-            sensor = self.ripples[arguments["geom"]].sensor(**others)
-            count = sensor.rate * control
+            sensor_arguments = {key: value for key, value in arguments.items() if key != "geom"}
+            sensor = self.ripples[arguments["geom"]].sensor(**sensor_arguments)
+            count = sensor.rate * control_step
             if round(count) < 1 or abs(count - round(count)) > _ROUND_OFF * count:
                 raise SceneError(
-                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s: "
-                    "this must be a whole number; choose the rate accordingly"
+                    f"samples of sensor {name!r} in a control step of {control_step:g} s must be a "
+                    f"whole number, got {count:g}; choose the rate accordingly"
                 )
             self._blocks[name] = SampleBlocks(sensor, round(count))
 
@@ -288,10 +290,12 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         if not self._blocks:
             return observation
         samples = {name: blocks.latest() for name, blocks in self._blocks.items()}
-        own = isinstance(self.env.observation_space, gymnasium.spaces.Dict)
-        return {**(observation if own else {"observation": observation}), **samples}
+        if isinstance(self.env.observation_space, gymnasium.spaces.Dict):
+            return {**observation, **samples}
+        return {"observation": observation, **samples}
 
     def _info(self) -> dict[str, Any]:
+        """The entries of `info` that are about the ripples."""
         heights = {name: self.ripples[name].height for name in self.ripples}
         return {"impulses": self.ripples.last_impulses, "heights": heights}
 

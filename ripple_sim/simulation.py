@@ -23,7 +23,7 @@ from ripple_sim.solver.compile_clock import work_clock
 from ripple_sim.solver.errors import FUNCTION, POSITIVE, checked, instance
 from ripple_sim.solver.waves.sensor import Sensor
 
-# More physics steps in a frame are a mistake in a unit, and would seem to hang.
+# Highest number of physics steps in a frame: more are a mistake in a unit, and would seem to hang.
 _MAX_STEPS_PER_FRAME = 100_000
 
 
@@ -71,7 +71,7 @@ class Simulation:
     """
 
     impulses: list[Impulse]
-    _steps: int  # of the next frame, already taken
+    _steps: int  # physics steps that the next frame has already taken
 
     @checked(
         SceneError,
@@ -107,14 +107,13 @@ class Simulation:
             apply_maps(self.ripples, entry)
             name = target_name(self.model, find_target(self.model, entry.geom))
             self.limited[name] = entry.limit
-        # heights at the beginning [m], by geom
-        self._heights = {}
+        self._heights_at_start = {}  # by geom [m]
         for entry in scene.targets:
             if entry.height is not None:
-                self._heights[entry.geom] = entry.height.heights(self.ripples, entry.geom)
-        # materials at the beginning, by geom
-        self._materials = {name: self.ripples[name].material for name in self.ripples}
-        # work so far [s]
+                self._heights_at_start[entry.geom] = entry.height.heights(self.ripples, entry.geom)
+        # by geom
+        self._materials_at_start = {name: self.ripples[name].material for name in self.ripples}
+        # times spent so far [s]
         self.physics_seconds = 0.0
         self.wave_seconds = 0.0
         self.reset()
@@ -173,10 +172,16 @@ class Simulation:
 
         `options` has the attributes rate, resolution, layout, rim and backend.
         """
-        chosen = {
-            name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")
-        }
-        return cls(scene, fps=options.rate, operator=operator, on_step=on_step, **chosen)
+        return cls(
+            scene,
+            fps=options.rate,
+            resolution=options.resolution,
+            layout=options.layout,
+            rim=options.rim,
+            backend=options.backend,
+            operator=operator,
+            on_step=on_step,
+        )
 
     @property
     def backend(self) -> str:
@@ -226,7 +231,7 @@ class Simulation:
         self._script.apply(self.data, self.ripples)
         with physics_errors():
             mujoco.mj_step(self.model, self.data)
-        stepped = work_clock()
+        physics_end = work_clock()
         broken = divergence(self.data)
         if broken is not None:
             raise SimulationError(
@@ -235,8 +240,8 @@ class Simulation:
             )
         self.ripples.step(self.data)
         self.impulses += self.ripples.last_impulses
-        self.physics_seconds += stepped - start
-        self.wave_seconds += work_clock() - stepped
+        self.physics_seconds += physics_end - start
+        self.wave_seconds += work_clock() - physics_end
 
     def reset(self) -> None:
         """Return to the beginning: bodies, waves, materials and script."""
@@ -247,11 +252,11 @@ class Simulation:
         with physics_errors():
             mujoco.mj_forward(self.model, self.data)
         self.ripples.reset()
-        for name, material in self._materials.items():
+        for name, material in self._materials_at_start.items():
             if self.ripples[name].material is not material:
                 self.ripples.change_material(name, **vars(material))
-                self._materials[name] = self.ripples[name].material
-        for geom, height in self._heights.items():
+                self._materials_at_start[name] = self.ripples[name].material
+        for geom, height in self._heights_at_start.items():
             self.ripples[geom].add_height(height)
         self._script = Script(self.model, self.scene.events, list(self.ripples))
         self.impulses = []

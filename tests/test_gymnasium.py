@@ -507,7 +507,7 @@ def test_sensors_add_their_samples_to_the_observations(path: Path) -> None:
     assert not again["sag"].any()
     with pytest.raises(
         RippleError,
-        match=r"'tap' has 5\.01 samples in a control step of 0\.01 s: this must be a whole number",
+        match=r"in a control step of 0\.01 s must be a whole number, got 5\.01; choose the rate",
     ):
         RippleWrapper(
             BallEnv(path), materials, sensors={"tap": sensors["tap"] | {"rate": 501}}, **OPTIONS

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
 from ripple_sim.solver.kernel import Floats32, kernel
 
-# Steps of the table from linear light to sRGB: so many that each of the 256 codes has entries, also
-# the darkest ones.
+# Steps of the table from linear light to sRGB: with so many each of the 256 codes has entries, even
+# the darkest.
 _TABLE_STEPS = 1 << 14
 
-# linear light, 0 to 1, of each sRGB code
+# Linear light of each sRGB code, 0 to 1.
 _LINEAR_OF_CODE = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
 
-# sRGB code of each step of linear light from 0 to 1
+# The sRGB code of each step of linear light from 0 to 1.
 _CODE_OF_LINEAR = np.rint(255 * linear_to_srgb(np.arange(_TABLE_STEPS + 1) / _TABLE_STEPS)).astype(
     np.uint8
 )

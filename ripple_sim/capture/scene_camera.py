@@ -14,9 +14,12 @@ from ripple_sim.render import Camera, FixedCamera
 from ripple_sim.render.pose import Pose
 from ripple_sim.scene.camera_entry import PATH_FIELDS, CameraEntry
 
-_MIN_FOCAL_DISTANCE = 0.02  # in distances of the camera from what it looks at: the near plane
+# Least distance of the plane in focus, over the camera's distance from what it looks at: there the
+# near plane is.
+_MIN_FOCAL_DISTANCE = 0.02
 
-_DEFAULT_DISTANCE = 1.5  # of the free camera from its aim, in extents of the model
+# Distance of the free camera from what it looks at, in extents of the model.
+_DEFAULT_DISTANCE = 1.5
 
 
 def viewpoint(
@@ -24,11 +27,11 @@ def viewpoint(
 ) -> Camera | FixedCamera:
     """Camera of a scene at a time [s].
 
-    A camera named in the MJCF is taken as it stands in `data` (it may ride on a body). Otherwise
-    MuJoCo's free camera, aimed at the model's middle where the scene says nothing else. With
-    `orbit` either circles by that many degrees a second; with `track` the free camera moves along
-    with a body's centre of mass, and the named one turns towards it. The keys of a path move the
-    free camera.
+    A camera named in the MJCF is taken as it stands in `data`; it may ride on a body. Without a
+    name it is MuJoCo's free camera, which looks at the model's middle if the scene has no `lookat`.
+    With `orbit` either camera circles by that many degrees a second. With `track` the free camera
+    moves along with a body's centre of mass, and `lookat` counts from there; the named camera turns
+    towards it. The keys of a path move the free camera.
     """
     entry = on_path(entry, time)
     tracked = None if entry.track is None else data.subtree_com[model.body(entry.track).id]
@@ -39,9 +42,11 @@ def viewpoint(
         if entry.orbit:
             fixed = _orbited(fixed, np.radians(entry.orbit) * time)
         return fixed
-    base = np.zeros(3) if tracked is not None else model.stat.center
-    aim = base if entry.lookat is None else entry.lookat
-    x, y, z = (float(value) for value in (aim if tracked is None else tracked + aim))
+    if tracked is not None:
+        aim = tracked if entry.lookat is None else tracked + entry.lookat
+    else:
+        aim = model.stat.center if entry.lookat is None else entry.lookat
+    x, y, z = (float(value) for value in aim)
     distance = entry.distance
     if distance is None:
         distance = _DEFAULT_DISTANCE * float(model.stat.extent)
@@ -97,9 +102,9 @@ def focal_distance(
         point = data.subtree_com[body] if body >= 0 else data.geom_xpos[model.geom(entry.focus).id]
     else:
         point = np.array(entry.focus)
-    return max(
-        float((pose.position - point) @ pose.rotation[:, 2]), _MIN_FOCAL_DISTANCE * pose.distance
-    )
+    backwards = pose.rotation[:, 2]
+    distance = float((pose.position - point) @ backwards)
+    return max(distance, _MIN_FOCAL_DISTANCE * pose.distance)
 
 
 def _orbited(camera: FixedCamera, angle: float) -> FixedCamera:

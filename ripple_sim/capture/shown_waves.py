@@ -20,6 +20,10 @@ from .snapshot import Field, Heights
 # Height of waves that catch the eye [pixels].
 _VISIBLE_HEIGHT = 5.0
 
+# Least distance of the camera from a target's surface, over its distance from what it looks at: a
+# camera within the target's bounding sphere looks at a surface all the same.
+_MIN_DISTANCE_SHARE = 0.1
+
 # The dent under a body is no ring: this far from the place of a touch, over the target's size, and
 # for so long after it [s], heights do not count.
 _DENT_SHARE = 0.12
@@ -35,16 +39,13 @@ class _Height(NamedTuple):
         [pixels]
     metres : float
         [m]
-    pixel : float
+    pixel_width : float
         Width of a pixel there [m].
     """
 
-    pixels: float
-    metres: float
-    pixel: float
-
-
-_NO_HEIGHT = _Height(0.0, 0.0, 1.0)
+    pixels: float = 0.0
+    metres: float = 0.0
+    pixel_width: float = 1.0
 
 
 @dataclasses.dataclass
@@ -61,8 +62,8 @@ class _Record:
         Times [s] and places of the latest touches, in the frame of the geom [m].
     """
 
-    highest: _Height = _NO_HEIGHT
-    crest: _Height = _NO_HEIGHT
+    highest: _Height = dataclasses.field(default_factory=_Height)
+    crest: _Height = dataclasses.field(default_factory=_Height)
     settled: bool = False
     touches: list[tuple[float, NDArray[np.float64]]] = dataclasses.field(default_factory=list)
 
@@ -106,9 +107,9 @@ class ShownWaves:
                 if 0 <= data.time - time <= _DENT_TIME
             ]
             if record.crest.pixels < 1:
-                self._measure(name, record, height, self._pixel(name, data, pose))
+                self._measure(name, record, height, self._pixel_width(name, data, pose))
 
-    def _pixel(self, name: str, data: mujoco.MjData, pose: Pose) -> float:
+    def _pixel_width(self, name: str, data: mujoco.MjData, pose: Pose) -> float:
         """Width of a pixel at the nearest point of a target [m]."""
         model = self._ripples.model
         geom = self._ripples.geom_ids[name]
@@ -116,18 +117,21 @@ class ShownWaves:
         if geom < model.ngeom:  # a soft target has no position
             to_middle = float(np.linalg.norm(data.geom_xpos[geom] - pose.position))
             to_surface = to_middle - float(model.geom_rbound[geom])
-            distance = max(to_surface, 0.1 * distance)
+            distance = max(to_surface, _MIN_DISTANCE_SHARE * distance)
         return pose.pixel_height(distance, self._height)
 
-    def _measure(self, name: str, record: _Record, height: Field, pixel: float) -> None:
-        """Raise a target's record to its highest wave and its highest ring."""
+    def _measure(self, name: str, record: _Record, height: Field, pixel_width: float) -> None:
+        """Raise a target's record to its highest wave and its highest ring.
+
+        `pixel_width` is the width of a pixel at the target [m].
+        """
         peak = height.peak if isinstance(height, DeviceField) else float(np.abs(height).max())
-        record.highest = max(record.highest, _Height(peak / pixel, peak, pixel))
+        record.highest = max(record.highest, _Height(peak / pixel_width, peak, pixel_width))
         record.settled |= peak > 0 and not record.touches
-        # what a GPU holds is read back only where it may raise the record
-        if record.touches and peak / pixel > record.crest.pixels:
+        # heights on a GPU are read back only where they may raise the record
+        if record.touches and peak / pixel_width > record.crest.pixels:
             peak = self._peak_of_rings(name, record, np.asarray(height))
-        record.crest = max(record.crest, _Height(peak / pixel, peak, pixel))
+        record.crest = max(record.crest, _Height(peak / pixel_width, peak, pixel_width))
 
     def _peak_of_rings(self, name: str, record: _Record, height: NDArray[np.float32]) -> float:
         """Highest wave of a target outside the dents of the latest touches [m]."""
@@ -144,18 +148,16 @@ class ShownWaves:
         There is no warning of targets without waves, nor of `silent` ones.
         """
         for name, record in self._records.items():
-            shown = record.judged()
-            if 0 < shown.pixels < 1 and name not in silent:
+            judged = record.judged()
+            if 0 < judged.pixels < 1 and name not in silent:
                 density = np.asarray(self._ripples[name].material.density)
-                factor = _VISIBLE_HEIGHT / shown.pixels
+                factor = _VISIBLE_HEIGHT / judged.pixels
                 lower = "" if density.ndim else f", {float(density) / factor:.2g} kg/m^2,"
                 warn_caller(
-                    f"no wave on {name!r} was higher than a pixel: {shown.metres:.2g} m at most, "
-                    f"where a pixel is {shown.pixel:.2g} m"
-                    f" wide. A density {factor:.2g} times lower{lower} would show "
-                    f"{_VISIBLE_HEIGHT:g} pixels; so may "
-                    'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in '
-                    "Python"
+                    f"no wave on {name!r} was higher than a pixel: {judged.metres:.2g} m at most, "
+                    f"where a pixel is {judged.pixel_width:.2g} m wide. A density {factor:.2g} "
+                    f"times lower{lower} would show {_VISIBLE_HEIGHT:g} pixels; so may material = "
+                    '{preset = "suited"} in a scene file, Material.suited(size, hit) in Python'
                 )
 
     def warn_of_none(self) -> None:
@@ -164,7 +166,6 @@ class ShownWaves:
             if record.highest.pixels == 0:
                 warn_caller(
                     f"there was no wave on {name!r}: nothing touched it. Drop or throw a body on "
-                    f"it, or poke it, in a "
-                    "scene file by [[drop]], [[throw]] or [[poke]]; or let a geom ripple that is "
-                    "touched"
+                    "it, or poke it, in a scene file by [[drop]], [[throw]] or [[poke]]; or let a "
+                    "geom ripple that is touched"
                 )

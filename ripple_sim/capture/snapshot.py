@@ -29,10 +29,14 @@ from ripple_sim.solver.waves.motion import MovedGradients
 Field: TypeAlias = NDArray[np.float32] | DeviceField
 Heights = dict[str, Field]
 
-_STEP_DECIMALS = 9  # of times in physics steps; a time off a whole step by round-off counts as it
+# Decimals of times in physics steps: a time that is off a whole step by round-off is rounded to it.
+_STEP_DECIMALS = 9
 
-_GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0  # its multiples are spread evenly modulo 1
-_FULL_TURN = 360.0  # of a rotary shutter [degrees], which is then open from frame to frame
+# The multiples of this number are spread evenly modulo 1.
+_GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0
+
+# Angle of a rotary shutter that is open all the time from frame to frame [degrees].
+_FULL_TURN = 360.0
 
 
 class ShutterTimes:
@@ -67,25 +71,29 @@ class ShutterTimes:
             same object as before where no time has passed.
         """
         simulation = self._simulation
-        done = 0  # physics steps
-        now = self._heights()
-        before = now
+        steps_taken = 0
+        heights_now = self._heights()
+        heights_before = heights_now
         for time in self._times_in_steps:
-            while done < time:
+            while steps_taken < time:
                 mujoco.mj_copyData(self._start, simulation.model, simulation.data)
                 simulation.step()
-                before = now
-                now = self._heights()
-                done += 1
-            steps_back = done - time
+                steps_taken += 1
+                heights_before = heights_now
+                heights_now = self._heights()
+            steps_back = steps_taken - time
             if steps_back == 0:
-                yield simulation.data, now
+                yield simulation.data, heights_now
             else:
                 self._go_back(steps_back * simulation.model.opt.timestep)
-                heights = {name: _blend(now[name], before[name], steps_back) for name in now}
+                heights = {
+                    name: _blend(height, heights_before[name], steps_back)
+                    for name, height in heights_now.items()
+                }
                 yield self._between, heights
 
     def _heights(self) -> Heights:
+        """The present heights of all targets."""
         ripples = self._simulation.ripples
         return {name: ripples[name].snapshot() for name in ripples}
 
