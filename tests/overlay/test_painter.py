@@ -19,6 +19,17 @@ from ripple_sim.overlay import (
 )
 from ripple_sim.scene import parse_request
 
+SIZE = (640, 360)
+GREY = 90  # of an empty frame
+CURVE = (np.linspace(0, 1, 9), np.ones(9))
+CORNERS = {
+    "time": "top left",
+    "grid": "top left",
+    "contacts": "top right",
+    "height": "bottom left",
+    "energy": "bottom right",
+}
+
 
 def test_sprite_covers_in_proportion() -> None:
     sprite = Sprite(10, 6)
@@ -73,40 +84,36 @@ def test_arrow_has_its_length_and_fades() -> None:
     assert dark[110:].max() == 0
 
 
-SIZE = (640, 360)
-CURVE = (np.linspace(0, 1, 9), np.ones(9))
-CORNERS = {"time": "top left", "grid": "top left", "contacts": "top right", "height": "bottom left",
-           "energy": "bottom right"}  # fmt: skip
-
-
 def notes(time: float = 1.0, marks: float = 1.0) -> Notes:
-    one = 1.0, 1.0
-    return Notes(time, [], one, [], (marks, marks), [CURVE], one)
+    scale = 1.0, 1.0
+    return Notes(time, [], scale, [], (marks, marks), [CURVE], scale)
 
 
 def painted(words: list[str], content: Notes, channels: int = 3, **options: object) -> np.ndarray:
-    frame = np.full((*SIZE[::-1], channels), 90, np.uint8)
-    Painter(
-        parse_request(words), Layout(*SIZE), **{"duration": 5.0, "spacing": 8, **options}
-    ).paint(frame, content)
+    width, height = SIZE
+    frame = np.full((height, width, channels), GREY, np.uint8)
+    settings = {"duration": 5.0, "spacing": 8, **options}
+    Painter(parse_request(words), Layout(*SIZE), **settings).paint(frame, content)
     return frame
 
 
 @pytest.mark.parametrize("channels", [3, 4])
 @pytest.mark.parametrize("word", CORNERS)
 def test_an_overlay_is_drawn_in_its_own_corner(word: str, channels: int) -> None:
-    rows, columns = np.nonzero((painted([word], notes(), channels) != 90).any(axis=-1))
+    is_painted = (painted([word], notes(), channels) != GREY).any(axis=-1)
+    rows, columns = np.nonzero(is_painted)
     corner = CORNERS[word]
+    width, height = SIZE
     assert len(rows) > 500
-    assert rows.max() < SIZE[1] / 2 if "top" in corner else rows.min() > SIZE[1] / 2
-    assert columns.max() < SIZE[0] / 2 if "left" in corner else columns.min() > SIZE[0] / 2
+    assert rows.max() < height / 2 if "top" in corner else rows.min() > height / 2
+    assert columns.max() < width / 2 if "left" in corner else columns.min() > width / 2
 
 
 def test_all_overlays_together_look_like_each_alone() -> None:
     everything = painted(["contacts", "height", "energy", "time"], notes())
     for word in ("contacts", "height", "energy", "time"):
         alone = painted([word], notes())
-        there = (alone != 90).any(axis=-1)
+        there = (alone != GREY).any(axis=-1)
         np.testing.assert_array_equal(everything[there], alone[there])
 
 
@@ -118,20 +125,22 @@ def test_all_overlays_together_look_like_each_alone() -> None:
 def test_overlays_without_data_are_not_drawn(
     words: list[str], options: dict, content: Notes
 ) -> None:
-    assert (painted(words, content, **options) == 90).all()
+    assert (painted(words, content, **options) == GREY).all()
 
 
 @pytest.mark.parametrize(("duration", "same"), [(5.0, False), (500.0, True)])
 def test_the_clock_of_a_long_video_has_fewer_decimals(duration: float, same: bool) -> None:
-    one, other = (painted(["time"], notes(time), duration=duration) for time in (1.61, 1.64))
+    one = painted(["time"], notes(1.61), duration=duration)
+    other = painted(["time"], notes(1.64), duration=duration)
     assert np.array_equal(one, other) is same
 
 
 def test_panels_of_one_corner_lie_below_one_another() -> None:
     both = painted(["time", "grid"], notes())
     clock = painted(["time"], notes())
-    under = np.nonzero((both != clock).any(axis=(1, 2)))[0]
-    assert under.min() > np.nonzero((clock != 90).any(axis=(1, 2)))[0].max()
+    rows_of_grid = np.flatnonzero((both != clock).any(axis=(1, 2)))
+    rows_of_clock = np.flatnonzero((clock != GREY).any(axis=(1, 2)))
+    assert rows_of_grid.min() > rows_of_clock.max()
 
 
 def test_energy_plot_draws_values_at_their_height_and_grows_with_time() -> None:
@@ -143,15 +152,21 @@ def test_energy_plot_draws_values_at_their_height_and_grows_with_time() -> None:
         plot.draw([(np.linspace(0, until, 300), np.full(300, value))], 2.0, 2.0).over(frame, 0, 0)
         return (frame[..., 2].astype(int) - frame[..., 0]) > 80
 
-    low, middle, high = (
-        np.flatnonzero(curve(value, 10.0)[:, 200]).mean() for value in (0.5, 1.0, 1.5)
-    )
-    assert low > middle > high
-    assert low - middle == pytest.approx(middle - high, abs=1.0)
-    quarter, half, whole = (
-        np.flatnonzero(curve(1.0, until).any(axis=0)).max() for until in (2.5, 5.0, 10.0)
-    )
-    assert half - quarter == pytest.approx((whole - quarter) / 3, abs=1.5)
+    def row_of(value: float) -> float:
+        return float(np.flatnonzero(curve(value, until=10.0)[:, 200]).mean())
+
+    def last_column_at(time: float) -> int:
+        return int(np.flatnonzero(curve(1.0, until=time).any(axis=0)).max())
+
+    low = row_of(0.5)
+    middle = row_of(1.0)
+    high = row_of(1.5)
+    assert low > middle > high  # rows are counted from above
+    assert low - middle == pytest.approx(middle - high, abs=1.0)  # a pixel
+    quarter = last_column_at(2.5)
+    half = last_column_at(5.0)
+    whole = last_column_at(10.0)
+    assert half - quarter == pytest.approx((whole - quarter) / 3, abs=1.5)  # pixels
 
 
 def test_the_energy_ledger_is_drawn_for_one_run_only() -> None:
@@ -162,7 +177,7 @@ def test_the_energy_ledger_is_drawn_for_one_run_only() -> None:
     two = painted(["energy"], other)
     assert (one != two).any()
     assert (one != painted(["energy"], plain)).any()
-    titles = {"titles": [("one", ""), ("two", "")]}
+    titles = [("one", ""), ("two", "")]
     np.testing.assert_array_equal(
-        painted(["energy"], content, **titles), painted(["energy"], other, **titles)
+        painted(["energy"], content, titles=titles), painted(["energy"], other, titles=titles)
     )

@@ -2,6 +2,7 @@
 
 import itertools
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -17,18 +18,43 @@ from ripple_sim.solver import sphere_atlas
 SIZES = [(320, 180), (640, 360), (720, 1280), (1280, 720), (3840, 2160)]
 SCALE = 1.0, 1.0
 
+# shares of the size of the type, above and below the line on which it stands
+ASCENT = 0.75
+DESCENT = 0.24
+
+SIZE = (640, 480)
+LAYOUT = Layout(*SIZE)
+EMPTY = '<mujoco><worldbody><geom size=".1" pos="0 0 -9"/>{}</worldbody></mujoco>'
+FRONT = Projection(Camera((0, 0, 0), 5.0, 90.0, 0.0).pose(), *SIZE)
+
+CAMERA = Camera((0.1, -0.2, 0.3), 4.0, 37.0, -25.0, 50.0)
+VEILED_BOX = """<mujoco><worldbody><geom type="box" size=".5 .5 .5"/>
+<geom name="veil" type="box" size=".01 9 9" pos="2 0 0" group="{}"/></worldbody></mujoco>"""
+
+
+class TextBox(NamedTuple):
+    """The box of a text [pixels], and the sprite on which the text is written."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+    sprite: Sprite
+
 
 @pytest.fixture
-def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, float, Sprite]]:
-    """Boxes (left, top, right, bottom) of all texts, and the sprites on which they are written."""
+def written(monkeypatch: pytest.MonkeyPatch) -> list[TextBox]:
+    """Boxes of all texts that are written."""
     boxes = []
     plain = Sprite.text
 
     def text(self: Sprite, x: float, y: float, text: str, size: int, *style: object) -> None:
-        align = style[1] if len(style) > 1 else "left"
+        align = str(style[1]) if len(style) > 1 else "left"
+        share_left_of_x = {"left": 0.0, "middle": 0.5, "right": 1.0}[align]
         width = overlay.text_width(text, size)
-        left = x - {"left": 0.0, "middle": 0.5, "right": 1.0}[str(align)] * width
-        boxes.append((left, y - 0.75 * size, left + width, y + 0.24 * size, self))
+        left = x - share_left_of_x * width
+        box = TextBox(left, y - ASCENT * size, left + width, y + DESCENT * size, self)
+        boxes.append(box)
         plain(self, x, y, text, size, *style)
 
     monkeypatch.setattr(Sprite, "text", text)
@@ -38,18 +64,20 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_ledger_overlaps_nothing_or_is_left_out(size: tuple[int, int], written: list) -> None:
     layout = Layout(*size)
-    bare, plot = (overlay.EnergyPlot(layout, 4.0, ledger=each) for each in (False, True))
+    plain_plot = overlay.EnergyPlot(layout, 4.0, ledger=False)
+    plot_with_ledger = overlay.EnergyPlot(layout, 4.0, ledger=True)
     curve = np.linspace(0, 3, 50), np.ones(50)
-    height = bare.draw([curve], 1.0, 1.0).height
+    plain_panel = plain_plot.draw([curve], 1.0, 1.0)
     written.clear()
-    panel = plot.draw([curve], 1.0, 1.0, Energy(-1.234e-3, 8.88e-4))
-    numbers = [box for box in written if box[4] is panel]
-    assert all(box[0] >= 0 and box[2] <= panel.width for box in written)
-    assert (panel.height > height) is (len(numbers) == 6)
-    for one, other in itertools.pairwise(sorted(numbers, key=lambda box: box[0])):
-        assert one[2] < other[0]
+    panel = plot_with_ledger.draw([curve], 1.0, 1.0, Energy(-1.234e-3, 8.88e-4))
+    in_ledger = [box for box in written if box.sprite is panel]
+    is_whole = len(in_ledger) == 6  # three names with a number each
+    assert all(box.left >= 0 and box.right <= panel.width for box in written)
+    assert (panel.height > plain_panel.height) is is_whole
+    for one, other in itertools.pairwise(sorted(in_ledger, key=lambda box: box.left)):
+        assert one.right < other.left
     if size == (1280, 720):
-        assert len(numbers) == 6
+        assert len(in_ledger) == 6
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -71,32 +99,32 @@ def test_panels_and_their_type_stay_inside_and_apart(size: tuple[int, int], writ
         taken[top : top + panel.height, left : left + panel.width] += 1
     assert taken.max() == 1
     assert len(written) > 12
-    for left, top, right, bottom, panel in written:
-        assert min(left, top) >= 0
-        assert right <= panel.width and bottom <= panel.height
+    for box in written:
+        assert min(box.left, box.top) >= 0
+        assert box.right <= box.sprite.width and box.bottom <= box.sprite.height
     assert layout.em >= 9
 
 
 @pytest.mark.parametrize("size", [(320, 180), (1280, 720)])
 def test_a_comparison_fits(size: tuple[int, int], written: list) -> None:
+    layout = Layout(*size)
+    width, _ = size
     titles = [overlay.TITLES["fem"], overlay.TITLES["dynamic-paint"]]
-    painter = Painter(
-        parse_request(NAMES[1:]), Layout(*size), duration=5.0, spacing=8, titles=titles
-    )
+    painter = Painter(parse_request(NAMES[1:]), layout, duration=5.0, spacing=8, titles=titles)
     curve = np.linspace(0, 5, 9), np.ones(9)
-    panels = painter._panels(Notes(1.0, [], SCALE, [], SCALE, [curve, curve], SCALE))
-    left, middle, right = (panels[corner][0].width for corner in ("top left", "top", "top right"))
-    assert max(left, right) + middle / 2 < size[0] / 2 - Layout(*size).margin
-    assert panels["bottom left"][0].width + panels["bottom right"][0].width < size[0]
-    plot = panels["bottom right"][0]
+    notes = Notes(1.0, [], SCALE, [], SCALE, [curve, curve], SCALE)
+    panels = {corner: first for corner, (first, *_) in painter._panels(notes).items()}
+    widest_side = max(panels["top left"].width, panels["top right"].width)
+    assert widest_side + panels["top"].width / 2 < width / 2 - layout.margin
+    assert panels["bottom left"].width + panels["bottom right"].width < width
+    plot = panels["bottom right"]
     heading = [
-        box for box in written if box[4].height == plot.height and box[3] < 2 * Layout(*size).em
+        box for box in written if box.sprite.height == plot.height and box.bottom < 2 * layout.em
     ]
-    lines = sorted(box[:3:2] for box in heading)
     # title, unit, and the names where there is room
-    assert len(lines) == (2 if size[0] < 400 else 4)
-    for (_, end), (begin, _) in itertools.pairwise(lines):
-        assert end < begin
+    assert len(heading) == (2 if width < 400 else 4)
+    for one, other in itertools.pairwise(sorted(heading, key=lambda box: (box.left, box.right))):
+        assert one.right < other.left
 
 
 @pytest.mark.parametrize("size", [(16, 16), (32, 400), (400, 32), (160, 90)])
@@ -110,14 +138,13 @@ def test_a_tiny_frame_has_no_panels(size: tuple[int, int]) -> None:
 @pytest.mark.parametrize("size", SIZES)
 def test_numbers_on_an_axis_do_not_touch(size: tuple[int, int], written: list) -> None:
     overlay.color_bar(Layout(*size), "height", "m", 0.0125, 0.0125)
-    rows: dict[float, list[tuple[float, float]]] = {}
-    for left, _, right, bottom, _panel in written:
-        rows.setdefault(bottom, []).append((left, right))
+    rows: dict[float, list[TextBox]] = {}
+    for box in written:
+        rows.setdefault(box.bottom, []).append(box)
     assert max(map(len, rows.values())) == 5
     for row in rows.values():
-        row.sort()
-        for (_, end), (begin, _) in itertools.pairwise(row):
-            assert end < begin
+        for one, other in itertools.pairwise(sorted(row, key=lambda box: (box.left, box.right))):
+            assert one.right < other.left
 
 
 def test_bar_has_the_colors_of_its_values() -> None:
@@ -127,15 +154,11 @@ def test_bar_has_the_colors_of_its_values() -> None:
     bar.over(frame, 0, 0)
     row = frame[round(2.25 * layout.em)].astype(int)
     for value in (-0.02, -0.01, 0.0, 0.005, 0.0199):
-        assert np.abs(row - overlay.colors(value, 0.02).astype(int)).max(axis=1).min() <= 2
-    middle = np.abs(row - overlay.colors(0.0, 0.02).astype(int)).sum(axis=1)
-    assert abs(int(np.argmin(middle)) - bar.width / 2) < 3
-
-
-SIZE = (640, 480)
-LAYOUT = Layout(*SIZE)
-EMPTY = '<mujoco><worldbody><geom size=".1" pos="0 0 -9"/>{}</worldbody></mujoco>'
-FRONT = Projection(Camera((0, 0, 0), 5.0, 90.0, 0.0).pose(), *SIZE)
+        difference = np.abs(row - overlay.colors(value, 0.02).astype(int)).max(axis=1)
+        assert difference.min() <= 2  # codes of 255, between neighbouring pixels
+    from_middle_colour = np.abs(row - overlay.colors(0.0, 0.02).astype(int)).sum(axis=1)
+    middle = int(np.argmin(from_middle_colour))
+    assert abs(middle - bar.width / 2) < 3
 
 
 def placed(marks: list[Mark], body: str = "", largest: float = 1.0) -> list:
@@ -181,11 +204,16 @@ def test_a_mark_over_the_border_is_cut_off(shift: tuple[int, int], channels: int
     opacity = np.ones(9)
     tip = np.array([40.3, 30.6])
     tail = np.array([-20.0, 60.0])
-    small, large = (np.full((*size, channels), 200, np.uint8) for size in ((60, 80), (3060, 3080)))
+    border = 1500  # [pixels] of the larger frame, around the smaller one
+    small = np.full((60, 80, channels), 200, np.uint8)
+    large = np.full((60 + 2 * border, 80 + 2 * border, channels), 200, np.uint8)
     overlay.draw_marks(small, [(tip + shift, tail + shift, opacity)], layout)
-    overlay.draw_marks(large, [(tip + shift + 1500, tail + shift + 1500, opacity)], layout)
-    np.testing.assert_allclose(small.astype(int), large[1500:1560, 1500:1580], atol=1)
-    assert (small != 200).any() == (max(map(abs, shift)) < 1000)
+    moved = np.array(shift) + border
+    overlay.draw_marks(large, [(tip + moved, tail + moved, opacity)], layout)
+    cut_out = large[border : border + 60, border : border + 80]
+    np.testing.assert_allclose(small.astype(int), cut_out, atol=1)  # round-off of a code
+    is_inside = max(map(abs, shift)) < 1000
+    assert (small != 200).any() == is_inside
 
 
 class Still:
@@ -231,34 +259,32 @@ def test_contacts_in_one_place_add_up_and_marks_are_sorted_by_impulse() -> None:
     assert [mark.impulse for mark in found] == pytest.approx([0.5, 0.7, 3.0])
 
 
-CAMERA = Camera((0.1, -0.2, 0.3), 4.0, 37.0, -25.0, 50.0)
-SCENE = """<mujoco><worldbody><geom type="box" size=".5 .5 .5"/>
-<geom name="veil" type="box" size=".01 9 9" pos="2 0 0" group="{}"/></worldbody></mujoco>"""
-
-
 @pytest.mark.parametrize("size", [(640, 480), (480, 640), (33, 17)])
 def test_points_ahead_project_to_their_pixel_and_points_behind_to_none(
     size: tuple[int, int],
 ) -> None:
     pose = CAMERA.pose()
-    up = np.tan(np.radians(pose.fovy) / 2)
+    projection = Projection(pose, *size)
+    width, height = size
+    half_height = np.tan(np.radians(pose.fovy) / 2)  # at a distance of 1
+    distances = np.array([[0.1], [3.0], [400.0]])  # [m]
     for pixel in np.random.default_rng(0).uniform(0, size, (20, 2)):
         # from the angle of view alone
-        x = (2 * pixel[0] / size[0] - 1) * up * size[0] / size[1]
-        y = (1 - 2 * pixel[1] / size[1]) * up
-        points = pose.position + np.array([[0.1], [3.0], [400.0]]) * (pose.rotation @ [x, y, -1.0])
-        np.testing.assert_allclose(
-            Projection(pose, *size).pixels(points), np.tile(pixel, (3, 1)), rtol=1e-9
-        )
-    behind = pose.position + np.array([[1.0], [0.0], [-1.0]]) * pose.rotation[:, 2]
+        column, row = pixel
+        x = (2 * column / width - 1) * half_height * width / height
+        y = (1 - 2 * row / height) * half_height
+        points = pose.position + distances * (pose.rotation @ [x, y, -1.0])
+        np.testing.assert_allclose(projection.pixels(points), np.tile(pixel, (3, 1)), rtol=1e-9)
+    backwards = pose.rotation[:, 2]
+    behind_beside_ahead = pose.position + np.array([[1.0], [0.0], [-1.0]]) * backwards
     np.testing.assert_array_equal(
-        np.isnan(Projection(pose, *size).pixels(behind)).all(axis=1), [True, True, False]
+        np.isnan(projection.pixels(behind_beside_ahead)).all(axis=1), [True, True, False]
     )
 
 
 @pytest.mark.parametrize(("group", "seen"), [(0, False), (2, False), (3, True)])
 def test_geoms_of_hidden_groups_hide_nothing(group: int, seen: bool) -> None:
-    model, data = posed(SCENE.format(group))
+    model, data = posed(VEILED_BOX.format(group))
     pose = Camera((0, 0, 0), 5.0, 180.0, 0.0).pose()  # at x = 5, looks along -x
     np.testing.assert_allclose(pose.position, [5, 0, 0], atol=1e-12)
     points = np.array([[0.5, 0.1, 0.2], [0.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
