@@ -12,6 +12,7 @@ and their difference over the elements' in the L2 norm.
 
 import argparse
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from arrival import (
@@ -35,8 +36,28 @@ MESHES = [
 RECEIVERS = 5
 
 
-def rows(name: str, mesh: Mesh, resolution: int, texels: float) -> list[list[str]]:
-    """One row for each receiver, as `main` prints them."""
+class Comparison(NamedTuple):
+    """The wave at one receiver, compared with that of finite elements."""
+
+    mesh: str
+    layout: str
+    distance: float  # from the source, in widths of the bump
+    correlation: float
+    difference: float  # in the L2 norm, over that of the finite elements
+
+    def printed(self) -> list[str]:
+        """The row of the table."""
+        return [
+            self.mesh,
+            self.layout,
+            f"{self.distance:.1f}",
+            f"{self.correlation:.4f}",
+            f"{self.difference:.1%}",
+        ]
+
+
+def comparisons(name: str, mesh: Mesh, resolution: int, texels: float) -> list[Comparison]:
+    """Compare the waves at each receiver; the bump is as wide as so many texels."""
     atlas = paper_atlas(mesh, resolution)
     width = texels / WIDTH * ideal_width(atlas)
     source, *receivers = spread_sources(mesh, RECEIVERS + 1)
@@ -47,15 +68,9 @@ def rows(name: str, mesh: Mesh, resolution: int, texels: float) -> list[list[str
     found = []
     for vertex, wave, reference in zip(receivers, ours.T, exact[:, receivers].T, strict=True):
         correlation = np.corrcoef(wave, reference)[0, 1]
-        off = np.linalg.norm(wave - reference) / np.linalg.norm(reference)
+        difference = np.linalg.norm(wave - reference) / np.linalg.norm(reference)
         found.append(
-            [
-                name,
-                atlas.layout,
-                f"{distance[vertex] / width:.1f}",
-                f"{correlation:.4f}",
-                f"{off:.1%}",
-            ]
+            Comparison(name, atlas.layout, distance[vertex] / width, correlation, difference)
         )
     return found
 
@@ -68,11 +83,10 @@ def main() -> None:
         "--width", type=float, default=8.0, help="of the bump, in texels of an even grid"
     )
     options = parser.parse_args()
-    found = [
-        row
-        for path in options.meshes
-        for row in rows(path.stem, load_mesh(path), options.resolution, options.width)
-    ]
+    found = []
+    for path in options.meshes:
+        compared = comparisons(path.stem, load_mesh(path), options.resolution, options.width)
+        found += [comparison.printed() for comparison in compared]
     print(table(["mesh", "layout", "distance", "correlation", "L2"], found))
 
 

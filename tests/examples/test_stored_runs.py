@@ -8,14 +8,14 @@ from eigenvalues import cases, errors_against, mean_error, of_polyhedron
 from plates import PLATES, atlas_of, frequencies
 from pulsating_sphere import level
 from surfaces import sphere
-from waveforms import rows
+from waveforms import comparisons
 
 from ripple_sim.solver import build_atlas, load_mesh
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 LIMBED = ROOT / "scenes" / "meshes" / "limbed.obj"
-RUNS = {path.stem: path.read_text("utf-8") for path in sorted((DOCS / "runs").glob("*.txt"))}
+RUNS = sorted((DOCS / "runs").glob("*.txt"))
 PAGES = {
     "plates": "validation.md",
     "waveforms": "validation.md",
@@ -24,16 +24,21 @@ PAGES = {
 }
 
 
-@pytest.mark.parametrize("run", RUNS)
-def test_the_printed_table_is_the_stored_run(run: str) -> None:
-    page = PAGES.get(run, "accuracy.md")
-    assert f"```\n{RUNS[run]}```" in (DOCS / page).read_text("utf-8")
+def stored(name: str) -> str:
+    """The output of a run, as it is kept."""
+    return (DOCS / "runs" / f"{name}.txt").read_text("utf-8")
+
+
+@pytest.mark.parametrize("run", RUNS, ids=lambda path: path.stem)
+def test_the_printed_table_is_the_stored_run(run: Path) -> None:
+    page = PAGES.get(run.stem, "accuracy.md")
+    assert f"```\n{stored(run.stem)}```" in (DOCS / page).read_text("utf-8")
 
 
 @pytest.mark.parametrize("name", ["hemisphere, fixed", "square, free"])
 def test_eigenvalues_are_of_todays_operator(name: str) -> None:
-    [row] = (line for line in RUNS["eigenvalues"].splitlines() if line.startswith(name))
-    texels, error, *_ = row.removeprefix(name).split()
+    [row] = (line for line in stored("eigenvalues").splitlines() if line.startswith(name))
+    texels, error, *_finer = row.removeprefix(name).split()
     case = cases()[name]
     atlas = build_atlas(case.mesh(), 32, layout="patches")
     assert f"{atlas.areas.size:,}" == texels
@@ -41,12 +46,15 @@ def test_eigenvalues_are_of_todays_operator(name: str) -> None:
 
 
 def test_eigenvalues_of_a_polyhedron_are_of_todays_sphere_map() -> None:
-    lines = RUNS["polyhedra"].partition("limbed.obj")[2].splitlines()[1:3]
+    _, _, of_limbed = stored("polyhedra").partition("limbed.obj")
+    _, mean_line, worst_line, *_ = of_limbed.splitlines()
+    # "cube, mean", texels, error, and those of finer atlases
+    _, _, _, mean, *_ = mean_line.split()
+    _, _, _, worst, *_ = worst_line.split()
     mesh = load_mesh(LIMBED)
     errors = errors_against(of_polyhedron(mesh, 1), build_atlas(mesh, 32))
-    assert [errors.mean(), errors.max()] == pytest.approx(
-        [float(line.split()[3]) for line in lines], rel=0.03
-    )
+    # sphere maps of other machines differ a little
+    assert [errors.mean(), errors.max()] == pytest.approx([float(mean), float(worst)], rel=0.03)
 
 
 def test_quadratic_elements_have_the_eigenvalues_of_a_flat_square() -> None:
@@ -57,13 +65,16 @@ def test_quadratic_elements_have_the_eigenvalues_of_a_flat_square() -> None:
 
 
 def test_waveforms_are_those_of_finite_elements() -> None:
-    assert min(float(row[3]) for row in rows("sphere", sphere(4), 16, 6.0)) > 0.9995
+    compared = comparisons("sphere", sphere(4), 16, 6.0)
+    assert min(each.correlation for each in compared) > 0.9995
 
 
 def test_levels_of_a_pulsating_sphere_are_of_todays_sound() -> None:
-    sizes, *rows = (line.split() for line in RUNS["pulsating_sphere"].splitlines())
-    stored = float(rows[1][4:][sizes[2:].index("1.0")])
-    assert level(1.0, 10) == pytest.approx(stored, abs=0.06)
+    heading, _, at_10_radii, _ = stored("pulsating_sphere").splitlines()
+    sizes = heading.removeprefix("k R").split()
+    levels = at_10_radii.removeprefix("r = 10 R").removesuffix("dB").split()
+    printed = dict(zip(sizes, levels, strict=True))["1.0"]
+    assert level(1.0, 10) == pytest.approx(float(printed), abs=0.06)  # of one decimal
 
 
 @pytest.mark.parametrize(
@@ -71,10 +82,9 @@ def test_levels_of_a_pulsating_sphere_are_of_todays_sound() -> None:
     ["free [Hz], NAFEMS FV12", "cantilever, lambda^2, Barton", "disk, clamped, lambda^2, Leissa"],
 )
 def test_frequencies_of_plates_are_of_todays_operator(name: str) -> None:
-    stored = (
-        RUNS["plates"].partition(f"\n{name}")[2].splitlines()[1].removeprefix("  N = 32").split()
-    )
+    _, _, of_plate = stored("plates").partition(f"\n{name}")
+    _, of_coarse, *_ = of_plate.splitlines()
+    printed = np.array(of_coarse.removeprefix("  N = 32").split(), float)
     plate = PLATES[name]
-    np.testing.assert_allclose(
-        frequencies(plate, atlas_of(plate, 32)), np.array(stored, float), rtol=1e-3
-    )
+    found = frequencies(plate, atlas_of(plate, 32))
+    np.testing.assert_allclose(found, printed, rtol=1e-3)  # of three decimals
