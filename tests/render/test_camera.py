@@ -18,6 +18,18 @@ MJCF = """<mujoco><worldbody>
 </worldbody><visual><global fovy="35" azimuth="20" elevation="-10"/></visual></mujoco>"""
 FREE = {"lookat": (0.3, -0.2, 0.1), "distance": 2.5, "azimuth": 37.0, "elevation": -28.0}
 
+PROJECTIONS = """<mujoco><statistic center="0 0 0" extent="3"/><worldbody><geom size=".1"/>
+<camera name="plain" pos="0 -5 1" xyaxes="1 0 0 0 .2 1" fovy="30"/>
+<camera name="orthographic" pos="1 -5 1" xyaxes="1 0 0 0 .2 1" projection="orthographic" fovy="3"/>
+<camera name="off centre" pos="0 -5 1" xyaxes="1 .1 0 0 .2 1" resolution="200 120"
+  sensorsize="8e-3 4.8e-3" focal="6e-3 6e-3" principal="1e-3 .5e-3"/>
+<camera name="two focal lengths" pos="0 -5 1" xyaxes="1 0 0 0 .2 1" resolution="200 120"
+  sensorsize="8e-3 4.8e-3" focal="3e-3 6e-3"/></worldbody></mujoco>"""
+
+SIZE = (200, 120)
+PARALLEL = {"orthographic": True, "fovy": 3.0}
+OFF_CENTRE = {"centre": (0.4, -0.2), "half_width": 0.6}
+
 
 def mujoco_camera(kind: str = "FREE", **attributes: object) -> mujoco.MjvCamera:
     camera = mujoco.MjvCamera()
@@ -101,10 +113,13 @@ def test_balls_about_triangles_hold_each_and_are_small() -> None:
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(300)], axis=1)
     triangles = ring[:, None] + random.normal(size=(300, 3, 3)) * 0.02
     balls = render.balls_about(triangles, 16)
-    inside = np.linalg.norm(triangles[:, :, None] - balls[:, :3], axis=3) <= balls[:, 3] + 1e-12
-    assert inside.all(axis=1).any(axis=1).all()
+    centres = balls[:, :3]
+    radii = balls[:, 3]
+    distances = np.linalg.norm(triangles[:, :, None] - centres, axis=3)
+    is_corner_inside = distances <= radii + 1e-12  # [triangle, corner, ball]; round-off
+    assert is_corner_inside.all(axis=1).any(axis=1).all()
     assert len(balls) == 16
-    assert balls[:, 3].max() < 0.4
+    assert radii.max() < 0.4
 
 
 def random_balls(count: int) -> np.ndarray:
@@ -139,26 +154,18 @@ def test_the_srgb_curve_has_known_values_and_an_inverse() -> None:
     np.testing.assert_allclose(srgb_to_linear(linear_to_srgb(values)), values, atol=1e-7)
 
 
-SIZE = (200, 120)
-
-
 def pose(seed: int, lens: tuple[float, float] = (0.0, 0.0), **others: object) -> Pose:
     rotation, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     rotation[:, 0] *= np.sign(np.linalg.det(rotation))
-    return dataclasses.replace(
-        Pose(np.array([0.3, -0.2, 0.5]), rotation, 2.0, 50.0, lens, 2.0), **others
-    )
+    plain = Pose(np.array([0.3, -0.2, 0.5]), rotation, 2.0, 50.0, lens, 2.0)
+    return dataclasses.replace(plain, **others)
 
 
 def pixels(points: np.ndarray, camera: Pose) -> np.ndarray:
-    """Where points show [pixels], [k, 2], and how far away along the camera's axis they lie."""
+    """Where points show [pixels], [k, 2]."""
     matrix = camera.projection(SIZE[0] / SIZE[1], (0.01, 100.0)) @ render.view_matrix(camera)
     clip = np.c_[points, np.ones(len(points))] @ matrix.T
     return (0.5 + 0.5 * clip[:, :2] / clip[:, 3:]) * SIZE
-
-
-PARALLEL = {"orthographic": True, "fovy": 3.0}
-OFF_CENTRE = {"centre": (0.4, -0.2), "half_width": 0.6}
 
 
 @pytest.mark.parametrize("lens", [(0.0, 0.0), (0.2, -0.1)])
@@ -176,7 +183,9 @@ def test_box_holds_the_ball(lens: tuple[float, float], others: dict[str, object]
     boxes = render.boxes_of(np.column_stack([centres, radii]), camera, SIZE)
     for centre, radius, box in zip(centres, radii, boxes, strict=True):
         shown = np.clip(pixels(centre + radius * directions, camera), 0, SIZE)
-        assert (shown >= box[:2]).all() and (shown <= box[2:]).all()
+        first_corner = box[:2]
+        last_corner = box[2:]
+        assert (shown >= first_corner).all() and (shown <= last_corner).all()
 
 
 @pytest.mark.parametrize("others", [{}, OFF_CENTRE, PARALLEL, PARALLEL | OFF_CENTRE])
@@ -190,12 +199,12 @@ def test_points_in_focus_stay_in_place_for_all_eyes_on_the_lens(
     in_focus = points - depth[:, None] * middle.rotation[:, 2]
     np.testing.assert_allclose(pixels(in_focus, aside), pixels(in_focus, middle), atol=1e-9)
     for camera in (middle, aside):
-        ways = camera.ways(points)
+        to_points = camera.ways(points)
         shown, away = camera.pixels(points, SIZE)
         ahead = away > 0
-        half_way = camera.pixels(points - 0.5 * ways, SIZE)
-        np.testing.assert_allclose(half_way[0][ahead], shown[ahead], atol=1e-6)
-        np.testing.assert_allclose(half_way[1], away / 2, atol=1e-12)
+        shown_half_way, away_half_way = camera.pixels(points - 0.5 * to_points, SIZE)
+        np.testing.assert_allclose(shown_half_way[ahead], shown[ahead], atol=1e-6)
+        np.testing.assert_allclose(away_half_way, away / 2, atol=1e-12)
 
 
 @pytest.mark.parametrize("others", [{}, PARALLEL])
@@ -204,15 +213,15 @@ def test_the_near_plane_moves_on_to_the_first_ball_ahead_and_no_farther(others) 
     forward = -camera.rotation[:, 2]
     balls = np.array([[*(camera.position + away * forward), 0.5] for away in (-3.0, 4.0, 6.0)])
     near, far = camera.planes_about(balls)
-    assert (near, far) == (pytest.approx(3.5, rel=0.02), 100.0)
-    assert near < 3.5
-    about = np.array([[*camera.position, 1.0]])
-    assert (
-        camera.planes_about(np.concatenate([balls, about]))
-        == camera.planes_about(balls[:0])
-        == (0.001, 100.0)
-    )
-    assert dataclasses.replace(camera, clip=None).planes_about(balls) == (0.02 * 2.0, 200.0 * 2.0)
+    first_surface = 4.0 - 0.5
+    assert (near, far) == (pytest.approx(first_surface, rel=0.02), 100.0)
+    assert near < first_surface
+    about_the_eye = np.array([[*camera.position, 1.0]])
+    with_eye_inside = camera.planes_about(np.concatenate([balls, about_the_eye]))
+    without_balls = camera.planes_about(balls[:0])
+    assert with_eye_inside == without_balls == (0.001, 100.0)
+    without_clip = dataclasses.replace(camera, clip=None)
+    assert without_clip.planes_about(balls) == (0.02 * 2.0, 200.0 * 2.0)
 
 
 def test_a_substitute_perspective_has_the_same_height_in_focus_with_one_warning() -> None:
@@ -266,45 +275,34 @@ def test_the_orthographic_box_is_clip_space(half_width, depth):
     np.testing.assert_array_equal(w, 1.0)
 
 
-SENSED = """<mujoco><statistic center="0 0 0" extent="3"/><worldbody><geom size=".1"/>
-<camera name="plain" pos="0 -5 1" xyaxes="1 0 0 0 .2 1" fovy="30"/>
-<camera name="orthographic" pos="1 -5 1" xyaxes="1 0 0 0 .2 1" projection="orthographic" fovy="3"/>
-<camera name="off centre" pos="0 -5 1" xyaxes="1 .1 0 0 .2 1" resolution="200 120"
-  sensorsize="8e-3 4.8e-3"
-  focal="6e-3 6e-3" principal="1e-3 .5e-3"/>
-<camera name="two focal lengths" pos="0 -5 1" xyaxes="1 0 0 0 .2 1" resolution="200 120"
-  sensorsize="8e-3 4.8e-3"
-  focal="3e-3 6e-3"/></worldbody></mujoco>"""
-
-
 def in_opengl(camera: mujoco.MjvGLCamera, aspect: float, points: np.ndarray) -> np.ndarray:
     """Points in clip space as glFrustum and glOrtho define it, by OpenGL's manual."""
-    bottom, top, near, far = (
-        float(getattr(camera, f"frustum_{name}")) for name in ("bottom", "top", "near", "far")
-    )
-    half = float(camera.frustum_width) or aspect * (top - bottom) / 2
-    left = camera.frustum_center - half
-    right = camera.frustum_center + half
+    bottom = float(camera.frustum_bottom)
+    top = float(camera.frustum_top)
+    near = float(camera.frustum_near)
+    far = float(camera.frustum_far)
+    half_width = float(camera.frustum_width) or aspect * (top - bottom) / 2
+    left = camera.frustum_center - half_width
+    right = camera.frustum_center + half_width
     forward = np.array(camera.forward, float)
     up = np.array(camera.up, float)
     x, y, z = np.stack([np.cross(forward, up), up, -forward]) @ (points - camera.pos).T
     if camera.orthographic:
-        clip = [(2 * x - right - left) / (right - left), (2 * y - top - bottom) / (top - bottom)]
-        return np.stack([*clip, -(2 * z + far + near) / (far - near)], axis=1)
-    clip = [
-        (2 * near * x + (right + left) * z) / (right - left),
-        (2 * near * y + (top + bottom) * z) / (top - bottom),
-    ]
-    return (
-        np.stack([*clip, (-(far + near) * z - 2 * far * near) / (far - near)], axis=1) / -z[:, None]
-    )
+        clip_x = (2 * x - right - left) / (right - left)
+        clip_y = (2 * y - top - bottom) / (top - bottom)
+        clip_z = -(2 * z + far + near) / (far - near)
+        return np.stack([clip_x, clip_y, clip_z], axis=1)
+    clip_x = (2 * near * x + (right + left) * z) / (right - left)
+    clip_y = (2 * near * y + (top + bottom) * z) / (top - bottom)
+    clip_z = (-(far + near) * z - 2 * far * near) / (far - near)
+    return np.stack([clip_x, clip_y, clip_z], axis=1) / -z[:, None]
 
 
 @pytest.mark.parametrize("name", ["plain", "orthographic", "off centre", "two focal lengths"])
 def test_every_projection_shows_and_clips_points_as_mujocos_frustum_does(
     name,
 ):
-    model = mujoco.MjModel.from_xml_string(SENSED)
+    model = mujoco.MjModel.from_xml_string(PROJECTIONS)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     scene = mujoco.MjvScene()
@@ -314,10 +312,12 @@ def test_every_projection_shows_and_clips_points_as_mujocos_frustum_does(
     theirs = in_opengl(mujoco.mjv_averageCamera(*scene.camera), aspect, points)
     for pose in (render.find_viewpoint(model, data, name), render.pose_of_scene(scene.camera, 2.0)):
         ours, _ = projected(pose.projection(aspect) @ render.view_matrix(pose), points)
-        np.testing.assert_allclose(ours, theirs, atol=2e-5)
+        np.testing.assert_allclose(ours, theirs, atol=2e-5)  # MuJoCo's frustum is float32
         shown, depth = pose.pixels(points, SIZE)
-        np.testing.assert_allclose(shown, (0.5 + 0.5 * theirs[:, :2] * [1, -1]) * SIZE, atol=1e-2)
-        np.testing.assert_allclose(depth, -((points - pose.position) @ pose.rotation)[:, 2])
+        their_pixels = (0.5 + 0.5 * theirs[:, :2] * [1, -1]) * SIZE
+        np.testing.assert_allclose(shown, their_pixels, atol=1e-2)
+        local = (points - pose.position) @ pose.rotation
+        np.testing.assert_allclose(depth, -local[:, 2])
         copied = mujoco.MjvScene()
         render.set_scene_camera(copied.camera, pose, model)
         again = in_opengl(copied.camera[0], aspect, points)
@@ -326,7 +326,7 @@ def test_every_projection_shows_and_clips_points_as_mujocos_frustum_does(
 
 @pytest.mark.parametrize("name", ["plain", "orthographic", "off centre", "two focal lengths"])
 def test_points_of_a_depth_image_lie_where_their_pixels_are(name):
-    model = mujoco.MjModel.from_xml_string(SENSED)
+    model = mujoco.MjModel.from_xml_string(PROJECTIONS)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     pose = render.find_viewpoint(model, data, name)
@@ -357,30 +357,40 @@ def test_a_camera_whose_pose_was_never_computed_gets_it_with_a_warning():
 def test_a_camera_on_a_body_keeps_its_distance_from_the_body():
     model = mujoco.MjModel.from_xml_string(MJCF)
     data = mujoco.MjData(model)
-    distances = []
-    for x in (0.0, 200.0):
+
+    def distance_at(x: float) -> float:
         data.qpos[0] = x
         mujoco.mj_forward(model, data)
-        distances.append(render.find_viewpoint(model, data, 1).distance)
-    assert distances[0] == pytest.approx(distances[1]) == pytest.approx(np.hypot(2.0, 0.2), rel=0.2)
+        return render.find_viewpoint(model, data, 1).distance
+
+    near_origin = distance_at(0.0)
+    from_camera_to_geom = np.hypot(2.0, 0.2)
+    # to the middle of the tree, which is about that of its geom
+    assert near_origin == pytest.approx(distance_at(200.0))
+    assert near_origin == pytest.approx(from_camera_to_geom, rel=0.2)
 
 
 def test_the_distance_of_a_camera_is_to_its_robot_or_to_its_target_body():
-    model = mujoco.MjModel.from_xml_string("""<mujoco><statistic center="9 9 9" extent="1"/>
-    <worldbody>
-        <body name="base" pos="3 0 0"><geom size=".2"/><body pos="0 0 1"><joint/><geom size=".2"/>
-        <camera name="wrist" pos="0 0 1"/></body></body>
-        <camera name="aimed" mode="targetbody" target="base"/><camera name="still"/></worldbody>
-        </mujoco>""")
+    model = mujoco.MjModel.from_xml_string("""<mujoco>
+      <statistic center="9 9 9" extent="1"/>
+      <worldbody>
+        <body name="base" pos="3 0 0"><geom size=".2"/>
+          <body pos="0 0 1"><joint/><geom size=".2"/><camera name="wrist" pos="0 0 1"/></body>
+        </body>
+        <camera name="aimed" mode="targetbody" target="base"/>
+        <camera name="still"/>
+      </worldbody></mujoco>""")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    away = {
+    distances = {
         name: render.find_viewpoint(model, data, name).distance
         for name in ("wrist", "aimed", "still")
     }
-    middle = 9 * np.sqrt(3)
-    assert away == {
-        "wrist": pytest.approx(1.5),
-        "aimed": pytest.approx(3.0),
-        "still": pytest.approx(middle),
+    to_middle_of_robot = 1.5
+    to_base = 3.0
+    to_middle_of_model = 9 * np.sqrt(3)
+    assert distances == {
+        "wrist": pytest.approx(to_middle_of_robot),
+        "aimed": pytest.approx(to_base),
+        "still": pytest.approx(to_middle_of_model),
     }

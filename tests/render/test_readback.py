@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import itertools
+from pathlib import Path
 from typing import Any
 
 import moderngl
@@ -29,24 +30,35 @@ WATER = '<geom name="water" type="sphere" size=".5" pos="-.6 0 .6"/>'
 # lit by the studio's single light, whose shaders are the quickest to compile
 REST = BALL + GLASS + WATER
 
+LONE_BALL = (
+    '<mujoco><worldbody><geom type="sphere" size="1" rgba="1 .5 .2 .6"/></worldbody></mujoco>'
+)
+
+
 # every pass, every format of a frame, and the background both at once and from a coarse one
-SCENES: dict[str, tuple[str, str, dict[str, Any]]] = {
-    "smooth background": (FLOOR + REST, "", {}),
-    "mirror": (REFLECTING + REST, TILES + MIRROR, {}),
-    "transparent, linear, one sample": (
-        FLOOR + REST,
-        "",
-        {"alpha": True, "linear": True, "samples": 0},
+@dataclasses.dataclass
+class DrawnScene:
+    body: str
+    asset: str = ""
+    options: dict[str, Any] = dataclasses.field(default_factory=dict)  # of the renderer
+
+
+SCENES = {
+    "smooth background": DrawnScene(FLOOR + REST),
+    "mirror": DrawnScene(REFLECTING + REST, TILES + MIRROR),
+    "transparent, linear, one sample": DrawnScene(
+        FLOOR + REST, options={"alpha": True, "linear": True, "samples": 0}
     ),
 }
 
 
 def renderer_of(gl, name: str) -> tuple[Renderer, mujoco.MjData]:
-    body, asset, options = SCENES[name]
-    model, data = posed(f"<mujoco><asset>{asset}</asset><worldbody>{body}</worldbody></mujoco>")
-    return Renderer(
-        gl, model, {model.geom("water").id: ball_surface("water")}, size=SIZE, **options
-    ), data
+    scene = SCENES[name]
+    model, data = posed(
+        f"<mujoco><asset>{scene.asset}</asset><worldbody>{scene.body}</worldbody></mujoco>"
+    )
+    targets = {model.geom("water").id: ball_surface("water")}
+    return Renderer(gl, model, targets, size=SIZE, **scene.options), data
 
 
 def drawn(renderer: Renderer, data: mujoco.MjData) -> list[np.ndarray]:
@@ -68,7 +80,7 @@ def test_frames_do_not_depend_on_earlier_frames(gl, name: str, monkeypatch):
     with renderer:
         expected = drawn(renderer, data)
         assert_same(drawn(renderer, data), expected)
-        # where something was, what is behind it shows as if it had never been there
+        # a ball that has moved away and back leaves no trace
         ball = 1
         data.geom_xpos[ball] += [0.7, 0.0, 0.3]
         assert (drawn(renderer, data)[0] != expected[0]).any()
@@ -80,7 +92,7 @@ def test_frames_do_not_depend_on_earlier_frames(gl, name: str, monkeypatch):
         def create_filled(resources: Resources, method: str, depth: float = depth) -> Any:
             def created(*arguments: Any, **options: Any) -> Any:
                 made = create(resources, method)(*arguments, **options)
-                # of others the third is what they hold
+                # textures and the like have their content as the third argument
                 if isinstance(made, moderngl.Buffer) or len(arguments) < 3:
                     with gl as ctx:
                         fill(ctx, made, depth, "reserve" in options)
@@ -106,11 +118,6 @@ def fill(ctx: moderngl.Context, made: Any, depth: float, empty: bool) -> None:
         color = np.nan if made.dtype in ("f2", "f4") else 0.7
         target.clear(color, color, color, color, depth=depth)
         target.release()
-
-
-LONE_BALL = (
-    '<mujoco><worldbody><geom type="sphere" size="1" rgba="1 .5 .2 .6"/></worldbody></mujoco>'
-)
 
 
 @pytest.fixture
@@ -156,7 +163,7 @@ def test_colours_are_divided_by_opacity(gl) -> None:
     frame = readback.fetch()
     expected = 255 * pixels.astype(float) / np.maximum(opacity, 1)[:, None]
     got = frame[::-1].reshape(-1, 4)
-    assert np.abs(got[:, :3] - expected[:, :3]).max() <= 0.501
+    assert np.abs(got[:, :3] - expected[:, :3]).max() <= 0.501  # rounded to a code
     np.testing.assert_array_equal(got[:, 3], opacity)
 
 
@@ -171,22 +178,22 @@ def test_a_video_is_the_same_whether_or_not_its_frames_are_drawn_ahead(
     scene = egg_scene(
         tmp_path, '<geom type="plane" size="2 2 1" pos="0 0 -0.25"/>', duration=0.4, density=20.0
     )
-    done: list[int] = []
-    render_all = Film.render_all
-    for order in ("ahead", "in turn"):
-        if order == "in turn":
-            monkeypatch.setattr(
-                Film, "render_all", lambda self, shots, ahead: render_all(self, shots)
-            )
-            monkeypatch.setattr(
-                rendering, "prefetched", lambda shots, waiting: contextlib.nullcontext(shots)
-            )
-        asked = VideoOptions(size=(64, 48), fps=30, backend=backend, **options)
+    finished: list[int] = []
+    asked = VideoOptions(size=(64, 48), fps=30, backend=backend, **options)
+
+    def render(folder: str) -> list[Path]:
         render_video(
-            scene, tmp_path / order, asked, progress=lambda frames, total: done.append(frames)
+            scene, tmp_path / folder, asked, progress=lambda frames, _: finished.append(frames)
         )
-    assert done == 2 * list(range(1, 13))
-    for one, other in zip(
-        *(sorted((tmp_path / order).iterdir()) for order in ("ahead", "in turn")), strict=True
-    ):
+        return sorted((tmp_path / folder).iterdir())
+
+    drawn_ahead = render("ahead")
+    render_all = Film.render_all
+    monkeypatch.setattr(Film, "render_all", lambda self, shots, ahead: render_all(self, shots))
+    monkeypatch.setattr(
+        rendering, "prefetched", lambda shots, waiting: contextlib.nullcontext(shots)
+    )
+    drawn_in_turn = render("in turn")
+    assert finished == 2 * list(range(1, 13))
+    for one, other in zip(drawn_ahead, drawn_in_turn, strict=True):
         assert one.read_bytes() == other.read_bytes()
