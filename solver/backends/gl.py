@@ -162,16 +162,16 @@ def _link_groups(
 ) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
     """Groups of links: how many, the links, and the first and one after the last of each group.
 
-    A link is 4 times its place with halo, plus its direction: 0 east, 1 north, 2 north-east, and 3
-    across north-east.
+    A link is its place in the fields of east, north, north-east, and across north-east, which lie
+    one after the other.
     """
     charts, n, _ = topology.shape
     chart, link, r, c = np.unravel_index(links, (charts, 4, n + 1, n + 1))
-    place = (chart * (n + 2) + r) * (n + 2) + c
+    place = ((link * charts + chart) * (n + 2) + r) * (n + 2) + c
     bounds = np.stack([begins[:-1], begins[1:]], axis=1)
     return (
         len(begins) - 1,
-        to_buffer(gl, 4 * place + link, np.int32),
+        to_buffer(gl, place, np.int32),
         to_buffer(gl, bounds, np.int32),
     )
 
@@ -355,8 +355,9 @@ class GLBackend:
             self._yielding = layout.texel_shader("flow")
         self._kick = layout.shader("kick")
         self._irregular_kick = layout.shader("irregular", KICK=1)
-        drift_defines = {} if self._part_shifts is None else {"PARTS": 1}
-        self._drift = layout.texel_shader("drift", **drift_defines)
+        self._drift = layout.texel_shader("drift")
+        parts = {} if self._part_shifts is None else {"PARTS": 1}
+        self._shift_and_drift = layout.texel_shader("drift", SHIFT=1, **parts)
         self._shift: Amplitude = 0.0
         self._prepared = (0.0, keeps_volume)
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
@@ -481,15 +482,20 @@ class GLBackend:
             self._kicks.set(self._layout.texels[texels], kicks)
             self._waiting = []
             self._kick_texels(self._kicks, 0.0)
-        if dt or np.any(self._shift):
-            self._drift["dt"] = dt
-            fields = (self.fields.h, self.fields.v, self._response)
+        fields = (self.fields.h, self.fields.v)
+        if np.any(self._shift):
+            self._shift_and_drift["dt"] = dt
             if self._part_shifts is None:
-                self._drift["shift"] = self._shift
-                bind_buffers(*fields)
+                self._shift_and_drift["shift"] = self._shift
+                bind_buffers(*fields, self._response)
             else:
                 self._part_shifts.set(self._shift)
-                bind_buffers(*fields, self._part_shifts.parts, self._part_shifts.amplitudes)
+                shifts = (self._part_shifts.parts, self._part_shifts.amplitudes)
+                bind_buffers(*fields, self._response, *shifts)
+            self._layout.run_texels(self._shift_and_drift)
+        elif dt:
+            self._drift["dt"] = dt
+            bind_buffers(*fields)
             self._layout.run_texels(self._drift)
         self._shift = 0.0
 
@@ -528,11 +534,14 @@ class GLBackend:
         used_by_define = {"EXTRA": self._extra.field, "MAPS": self._maps, "PARTS": self._held}
         defines = {name: 1 for name, used in used_by_define.items() if used}
         kick_drift = self._layout.texel_shader("kick_drift", **defines)
-        if self._held is None:
-            kick_drift["acceleration"] = load.acceleration
         if not self._maps:
             kick_drift["decay"] = k.decay
             kick_drift["spring"] = k.spring
+        if self._maps and self._held is None:
+            kick_drift["acceleration"] = load.acceleration
+        elif self._held is None:
+            kick_drift["push"] = k.span * np.float32(load.acceleration)
+        elif not self._maps:
             kick_drift["span"] = k.span
         return kick_drift
 

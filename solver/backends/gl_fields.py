@@ -31,6 +31,7 @@ _SHADER_PACKAGE = "ripple_sim.solver.backends.shaders"
 
 _FIELD_GROUP = 256  # threads of a group that makes a `DeviceField`
 _LIST_GROUP = 64  # threads of a group that works through a list
+_TEXEL_GROUP = 256  # threads of a group that works on texels
 _SUMMED_ENTRIES = 2048  # entries of a list that one group of threads adds up
 
 
@@ -143,11 +144,19 @@ class FieldLayout:
 
     def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that runs over all texels, see charts.glsl."""
-        return self.shader(name, N=self._n, **defines)
+        return self.gl.compute_shader(
+            _SHADER_PACKAGE,
+            name,
+            GROUP=_TEXEL_GROUP,
+            N=self._n,
+            CHARTS=self._places[0],
+            **defines,
+        )
 
     def run_texels(self, shader: moderngl.ComputeShader) -> None:
         """Run a shader over all texels."""
-        self.run_list(shader, len(self.texels))
+        shader.run(-(-len(self.texels) // _TEXEL_GROUP))
+        self.gl.barrier()
 
     def run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
         """Run a shader over a list of `count` entries, if there are any."""
@@ -188,9 +197,9 @@ class FieldLayout:
             return ctx.buffer(self._with_halo(*fields))
 
     def links(self, stencil: Stencil) -> NDArray[np.float32]:
-        """The four links of a stencil that start in each place, [C, n + 2, n + 2, 4]."""
-        links = np.zeros((*self._places, 4), np.float32)
-        links[:, :-1, :-1] = np.moveaxis(stencil.weights, 1, -1)
+        """The four links of a stencil that start in each place, [4, C, n + 2, n + 2]."""
+        links = np.zeros((4, *self._places), np.float32)
+        links[:, :, :-1, :-1] = stencil.weights.swapaxes(0, 1)
         return links
 
     def upload_links(

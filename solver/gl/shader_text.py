@@ -10,6 +10,8 @@ from importlib.resources.abc import Traversable
 from ..errors import GLError
 
 
+# Steps and frames ask for their shaders anew. Typed, since 1 and 1.0 are written differently.
+@functools.lru_cache(maxsize=None, typed=True)
 def load_shader(package: str, name: str, stage: str = "", **defines: object) -> str:
     """Read a shader, resolve its includes, and put the defines behind `#version`.
 

@@ -8,9 +8,10 @@ layout(std430, binding = 4) readonly buffer Factor { float factor[]; };
 #endif
 
 void main() {
-    int p = address(int(gl_GlobalInvocationID.x));
-    if (p < 0) return;
-    float force = force_at(p);
+    uint texel = gl_GlobalInvocationID.x;
+    if (beyond(texel)) return;
+    int p = address(texel);
+    float force = force_at(p, x[p]);
 #ifdef FACTOR
     force *= factor[p];
 #endif

@@ -7,14 +7,14 @@ layout(std430, binding = 1) buffer Result { float result[]; };
 layout(std430, binding = 2) readonly buffer Weights { float weights[]; };  // of neighbours and itself, field by field
 
 void main() {
-    int p = address(int(gl_GlobalInvocationID.x));
-    if (p < 0) return;
+    uint texel = gl_GlobalInvocationID.x;
+    if (beyond(texel)) return;
+    int p = address(texel);
     int steps[9] = int[9](-PITCH - 1, -PITCH, -PITCH + 1, -1, 1, PITCH - 1, PITCH, PITCH + 1, 0);
-    int field = result.length();
     float force = 0.0;
     for (int kind = 0; kind < 3; kind++)
         for (int k = 0; k < 9; k++)
-            force -= weights[(9 * kind + k) * field + p] * curvature[kind * field + p + steps[k]];
+            force -= weights[(9 * kind + k) * FIELD + p] * curvature[kind * FIELD + p + steps[k]];
 #ifdef ADD
     force += result[p];
 #endif

@@ -9,8 +9,9 @@ layout(std430, binding = 2) readonly buffer Dent { float dent[]; };
 #endif
 
 void main() {
-    int p = address(int(gl_GlobalInvocationID.x));
-    if (p < 0) return;
+    uint texel = gl_GlobalInvocationID.x;
+    if (beyond(texel)) return;
+    int p = address(texel);
     float height = h[p];
 #ifdef DENT
     height += dent[p];

@@ -7,8 +7,9 @@ layout(std430, binding = 1) buffer Dent { float dent[]; };
 layout(std430, binding = 2) readonly buffer YieldHeight { float limit[]; };
 
 void main() {
-    int p = address(int(gl_GlobalInvocationID.x));
-    if (p < 0) return;
+    uint texel = gl_GlobalInvocationID.x;
+    if (beyond(texel)) return;
+    int p = address(texel);
     float kept = clamp(h[p], -limit[p], limit[p]);
     dent[p] += h[p] - kept;
     h[p] = kept;

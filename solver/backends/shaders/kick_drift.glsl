@@ -12,29 +12,39 @@ layout(std430, binding = 5) readonly buffer ExtraForce { float extra[]; };
 #ifdef PARTS
 layout(std430, binding = 6) readonly buffer Parts { float parts[]; };
 layout(std430, binding = 7) readonly buffer Accelerations { float accelerations[]; };
-#else
-uniform float acceleration;
 #endif
+// Software drivers read a uniform anew for every texel, so there are as few as possible.
 uniform float dt;
 #ifndef MAPS
-uniform float decay, spring, span;
+uniform float decay, spring;
+#endif
+#if defined(PARTS) && !defined(MAPS)
+uniform float span;
+#elif defined(MAPS) && !defined(PARTS)
+uniform float acceleration;
+#elif !defined(PARTS)
+uniform float push;  // span times acceleration
 #endif
 
 void main() {
-    int p = address(int(gl_GlobalInvocationID.x));
-    if (p < 0) return;
-    float force = force_at(p);
+    uint texel = gl_GlobalInvocationID.x;
+    if (beyond(texel)) return;
+    int p = address(texel);
+    float here = x[p];
+    float force = force_at(p, here);
 #ifdef EXTRA
     force += extra[p];
 #endif
 #ifdef MAPS
-    int field = x.length();
-    float decay = coefficients[field + p], spring = coefficients[2 * field + p], span = coefficients[3 * field + p];
+    float decay = coefficients[FIELD + p], spring = coefficients[2 * FIELD + p], span = coefficients[3 * FIELD + p];
 #endif
 #ifdef PARTS
     float acceleration = accelerations[int(parts[p])];
 #endif
-    float velocity = decay * v[p] + (coefficients[p] * force + (span * acceleration - spring * x[p]));
+#if defined(PARTS) || defined(MAPS)
+    float push = span * acceleration;
+#endif
+    float velocity = decay * v[p] + (coefficients[p] * force + (push - spring * here));
     v[p] = velocity;
-    h_next[p] = x[p] + dt * velocity;
+    h_next[p] = here + dt * velocity;
 }
