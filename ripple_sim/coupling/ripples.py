@@ -336,6 +336,18 @@ class Ripples:
         for name, surface in list(self._surfaces.items()):
             self._change(name, options={**surface.options, "operator": operator})
 
+    def waves_by(self, name: GeomKey, operator: str) -> TargetWaves:
+        """Copy the waves of a surface to a solver with another wave operator.
+
+        The copy has the present height and velocity. No contact reaches it; the surface itself
+        stays as it is. Raises `SolverError` for an unknown operator.
+        """
+        surface = self._surface(name)
+        waves = surface.waves
+        copy = waves.on(waves.rest, waves.material, **{**surface.options, "operator": operator})
+        copy.state = waves.state
+        return copy
+
     def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
         """Carry a point [m] from the frame of a geom's body to the frame of the geom.
 

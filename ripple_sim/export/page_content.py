@@ -57,6 +57,7 @@ _SCRIPTS = (
     "drawing.js",
     "grid.js",
     "detail.js",
+    "rival.js",
     "player.js",
     "program.js",
     "controls.js",
@@ -146,6 +147,15 @@ class PageContent:
         these surfaces instead.
         """
         laws = {number: target.renewed() for number, target in enumerate(self.targets.values())}
+        return {number: law for number, law in laws.items() if law}
+
+    def rival_laws(self, operator: str) -> dict[int, str]:
+        """Laws of the surfaces that the page solves, by another wave operator, by number.
+
+        They begin with the present state, which must be that of the latest frame.
+        """
+        targets = enumerate(self.targets.values())
+        laws = {number: target.rival_law(operator) for number, target in targets}
         return {number: law for number, law in laws.items() if law}
 
     def looks(self, source: Source, names: Sequence[str]) -> dict[int, dict[str, Any]]:

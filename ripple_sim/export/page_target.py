@@ -111,11 +111,19 @@ class PageTarget:
             return ""
         self.solves = True
         self._waves.record(self._tape)
-        samples = self._surface.samples(self.part.vertices)
+        return self._law(self._waves)
+
+    def rival_law(self, operator: str) -> str:
+        """The law of the waves by another operator, from the present state on; or ""."""
+        if not self.solves:
+            return ""
+        return self._law(self._source.ripples.waves_by(self._name, operator))
+
+    def _law(self, waves: WaveSolver) -> str:
         return wave_law(
-            self._waves,
+            waves,
             limited=self._source.limited[self._name],
-            points=samples,
+            points=self._surface.samples(self.part.vertices),
             pulse=self._pulse_of_the_material(),
         )
 

@@ -114,6 +114,7 @@ class LoopView:
         movable = np.flatnonzero(self._model.body_dofnum)
         return {
             "operators": [],
+            "operator": "",
             "presets": [],
             "looks": [],
             "chosen": [{"preset": "", "look": ""} for _ in self._ripples],

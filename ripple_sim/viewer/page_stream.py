@@ -50,6 +50,7 @@ class PageStream:
     ) -> None:
         self.messages: queue.Queue[bytes | str | None] = queue.Queue()
         self.connected = False
+        self._rival = ""
         self._content = PageContent(source)
         stream = {"number": number, **menu}
         head = "".join(self._content.begin(data, chunk=1, stream=stream))
@@ -74,6 +75,14 @@ class PageStream:
         self.messages.put(zlib.compress(chunk.content, _COMPRESSION))
         for target, law in laws.items():
             self.tell(law={"target": target, "content": law})
+        if laws and self._rival:
+            self.compare(self._rival)
+
+    def compare(self, operator: str) -> None:
+        """Show the waves of another operator beside the run's from now on; "": no longer."""
+        self._rival = operator
+        laws = self._content.rival_laws(operator) if operator else {}
+        self.tell(rival={"operator": operator, "laws": laws})
 
     def repaint(self, source: Source, targets: Sequence[str]) -> None:
         """Send the looks that targets have in a source."""

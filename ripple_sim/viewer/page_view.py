@@ -87,6 +87,7 @@ class PageView:
             "step": self._step,
             "reset": self._reset,
             "operator": self._change_operator,
+            "compare": self._compare,
             "preset": self._change_preset,
             "look": self._change_look,
             "factors": self._change_factors,
@@ -136,6 +137,7 @@ class PageView:
             "looks": list(LOOKS),
             "chosen": self._choices.by_target(),
             "commands": list(self._actions),
+            "operator": self.session.operator,
             "paused": self.session.paused,
             "movable": movable.tolist(),
         }
@@ -190,6 +192,15 @@ class PageView:
     def _change_operator(self, command: Command) -> None:
         self.session.set_operator(command.name)
         self.pages.send([])
+        self.pages.tell(operator=self.session.operator)
+
+    def _compare(self, command: Command) -> None:
+        """Show the waves of another operator beside the run's, or no longer for an empty name."""
+        if command.name and command.name not in OPERATORS:
+            valid = ", ".join(OPERATORS)
+            raise ValueError(f"operator must be one of {valid}, got {command.name[:40]!r}")
+        self.pages.send([])
+        self.pages.compare(command.name)
 
     def _change_preset(self, command: Command) -> None:
         """Give targets a real material, or their own again for an empty name."""

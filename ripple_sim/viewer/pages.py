@@ -81,6 +81,7 @@ class Pages:
         self._menu = menu
         self._streams: dict[int, tuple[PageStream, float]] = {}  # with the time of opening [s]
         self._opened = 0
+        self._rival = ""  # operator that pages show beside the run's
         self._messages: queue.Queue[tuple[PageStream, bytes | str]] = queue.Queue()
 
     def open(self) -> PageStream:
@@ -89,6 +90,8 @@ class Pages:
             self._opened += 1
             stream = PageStream(self._source, self._data, self._opened, self._menu())
             self._streams[self._opened] = stream, time.monotonic()
+            if self._rival:
+                stream.compare(self._rival)
         return stream
 
     def connect(self, number: str) -> PageStream | None:
@@ -142,6 +145,15 @@ class Pages:
         """Send the present state as a frame, with the impulses since the last one."""
         for stream, _ in self._streams.values():
             stream.add(self._data, impulses)
+
+    def compare(self, operator: str) -> None:
+        """Show the waves of another operator beside the run's; "": no longer.
+
+        The latest frame that was sent must be the present state.
+        """
+        self._rival = operator
+        for stream, _ in self._streams.values():
+            stream.compare(operator)
 
     def repaint(self, source: Source, targets: Sequence[str]) -> None:
         """Show targets with the looks of a source from now on."""

@@ -16,6 +16,8 @@ from pages import opened
 import ripple_sim
 from ripple_sim import Material, Ripples
 from ripple_sim.scene import MaterialEntry, Scene, load_scene
+from ripple_sim.solver import Load, WaveSolver
+from ripple_sim.solver.waves.tape import Tape
 from ripple_sim.viewer import (
     ALL_TARGETS,
     Command,
@@ -79,11 +81,10 @@ class Page:
     def frames(self) -> int:
         return self.tab.evaluate("ripplePlayer.player.frames.count")
 
-    def heights(self) -> np.ndarray:
+    def heights(self, owner: str = "ripplePlayer.player") -> np.ndarray:
         """Of the texels, in the page."""
         heights = self.tab.evaluate(
-            "ripplePlayer.player.work.then(() => "
-            "Array.from(ripplePlayer.player.surfaces[0].solver.read().h))"
+            f"ripplePlayer.player.work.then(() => Array.from({owner}.surfaces[0].solver.read().h))"
         )
         return np.array(heights[:-1])
 
@@ -140,6 +141,51 @@ def test_changes_of_the_waves_reach_the_page(page: Page) -> None:
     page.wait_for(lambda: session.time < 0.1)
     page.run(0.05)
     page.wait_for(lambda: not np.abs(page.heights()).any())
+
+
+def field_of(waves: WaveSolver, texels: Any, values: Any) -> np.ndarray:
+    field = np.zeros(waves.operator.mass.size)
+    np.add.at(field, texels, values)
+    return field.reshape(waves.operator.mass.shape)
+
+
+def test_another_operator_is_shown_beside_with_waves_of_the_same_loads(page: Page) -> None:
+    """Its heights are those of a solver with that operator under the same loads."""
+    session = page.view.session
+    page.tab.click("#tune")
+    page.tab.select_option("#compare", "paper")
+    page.wait_until("!!ripplePlayer.player.rival")
+    page.tab.click("#tune")
+    both = page.tab.evaluate("""["view", "rival"].map(id => {
+        const {left, right} = document.getElementById(id).getBoundingClientRect();
+        return [left, right];
+    })""")
+    assert both == [[0, 160], [160, 320]]
+    (name,) = session.simulation.ripples
+    rival = session.simulation.ripples.waves_by(name, "paper")
+    tape = Tape()
+    session.simulation.ripples[name].record(tape)
+    page.tab.mouse.click(235, 80)  # on the right
+    page.wait_until("ripplePlayer.player.poked")
+    page.run(0.2)
+    load = None
+    for kind, first, second in tape.take():
+        if kind == "load":
+            load = Load(first, -second) if len(first) else None  # inwards
+        elif kind == "kick":
+            rival.add_velocity(field_of(rival, first, second))
+        else:
+            rival.step(first * second, first, load)
+    peak = np.abs(rival.height).max()
+    assert peak > 1e-4
+
+    def distance_from(height: np.ndarray) -> float:
+        return np.abs(page.heights("ripplePlayer.player.rival") - height.ravel()).max()
+
+    page.wait_for(lambda: distance_from(rival.height) < 0.01 * peak)
+    assert distance_from(page.heights()) > 0.05 * peak
+    page.tab.evaluate("ripplePlayer.player.send('compare', {name: ''})")
+    page.wait_until("!ripplePlayer.player.rival")
 
 
 def test_pause_holds_the_time_and_a_step_is_one_frame(page: Page) -> None:

@@ -108,7 +108,7 @@ async function step(player, ui, frames) {
 function savePicture(player) {
   player.redraw();
   const link = document.createElement("a");
-  link.href = player.canvas.toDataURL("image/png");
+  link.href = player.picture().toDataURL("image/png");
   link.download = `${document.title || "ripples"}.png`;
   link.click();
 }
@@ -191,13 +191,12 @@ function keys(player, ui) {
 
 // On a surface the pointer pokes it, beside it and with other buttons or two fingers it moves the camera.
 function pointer(player, ui) {
-  const canvas = player.canvas;
   const down = new Map();
   let dragged = null;
   let latest = 0;
   let held = null;
-  const place = ({clientX, clientY}) => {
-    const box = canvas.getBoundingClientRect();
+  const place = ({clientX, clientY, currentTarget}) => {
+    const box = currentTarget.getBoundingClientRect();
     return [(2 * (clientX - box.left)) / box.width - 1, 1 - (2 * (clientY - box.top)) / box.height];
   };
   const press = share => {
@@ -212,35 +211,43 @@ function pointer(player, ui) {
   ui.dragging = now => {
     if (dragged && now - latest > 1000 / DRAG_RATE) press(DRAG_SHARE);
   };
-  canvas.onpointerdown = event => {
-    canvas.setPointerCapture(event.pointerId);
+  const begin = event => {
+    event.currentTarget.setPointerCapture(event.pointerId);
     down.set(event.pointerId, event);
     dragged = down.size === 1 && event.button === 0 && !event.shiftKey ? place(event) : null;
     if (press(1)) return;
     held = dragged && player.send ? grabbed(player, ...dragged) : null;
     dragged = null;
   };
-  canvas.onpointerup = canvas.onpointercancel = event => {
+  const end = event => {
     if (held) player.send("drop");
     down.delete(event.pointerId);
     dragged = held = null;
   };
-  canvas.onpointermove = event => {
+  const move = event => {
     ui.place = place(event);
     if (dragged) dragged = ui.place;
     else if (held) pull(player, held, ...ui.place);
     else if (down.has(event.pointerId)) moveCamera(player, down, event);
-    else canvas.style.cursor = player.frame && player.pick(...place(event)) ? "pointer" : "grab";
+    else event.currentTarget.style.cursor = player.frame && player.pick(...place(event)) ? "pointer" : "grab";
     if (down.has(event.pointerId)) down.set(event.pointerId, event);
   };
-  canvas.onwheel = event => {
+  const zoom = event => {
     if (window.top !== window && !document.hasFocus()) return; // within another page, which scrolls
     event.preventDefault();
     player.free();
     player.orbit.distance *= Math.exp(0.001 * event.deltaY);
     player.redraw();
   };
-  canvas.oncontextmenu = event => event.preventDefault();
+  for (const canvas of [player.canvas, ui.of("rival")])
+    Object.assign(canvas, {
+      onpointerdown: begin,
+      onpointermove: move,
+      onpointerup: end,
+      onpointercancel: end,
+      onwheel: zoom,
+      oncontextmenu: event => event.preventDefault(),
+    });
 }
 
 // Turns the camera, or shifts it with the shift key or another button; two fingers shift and zoom.

@@ -88,6 +88,7 @@ class Player {
     });
     this.orbit = null; // azimuth and elevation [radians], distance and focus; null: the scene's camera
     this.poked = false;
+    this.rival = null; // waves of another operator, which are shown beside
     this.meta = JSON.parse(document.getElementById("meta").textContent);
     this.work = Promise.resolve(); // what goes through time, one after the other
   }
@@ -115,11 +116,10 @@ class Player {
   // The graphics card was lost, as on a sleeping phone: the loop has the waves as they were last drawn.
   lose() {
     this.drawing.lost = true;
-    for (const surface of this.surfaces)
-      if (surface) {
-        surface.solver.current = true;
-        surface.use(new WaveLoop(surface.law));
-      }
+    for (const surface of this.allSurfaces) {
+      surface.solver.current = true;
+      surface.use(new WaveLoop(surface.law));
+    }
   }
 
   // It came back: everything that was on it is made anew.
@@ -127,7 +127,7 @@ class Player {
     const drawing = new Drawing(this.canvas, this.meta);
     await drawing.load();
     this.drawing = drawing;
-    for (const surface of this.surfaces) if (surface) surface.grid = null;
+    for (const surface of this.allSurfaces) surface.grid = null;
     this.chooseSolvers();
     await this.paint();
   }
@@ -137,9 +137,14 @@ class Player {
     return this.surfaces.some(Boolean);
   }
 
+  // The surfaces that it solves, with the rival's.
+  get allSurfaces() {
+    return [...this.surfaces, ...(this.rival ? this.rival.surfaces : [])].filter(Boolean);
+  }
+
   // Solves the waves as it is faster here, or by "loop" or "pass".
   chooseSolvers(kind) {
-    this.surfaces.forEach(surface => surface && this.chooseSolver(surface, kind));
+    this.allSurfaces.forEach(surface => this.chooseSolver(surface, kind));
   }
 
   chooseSolver(surface, kind) {
@@ -167,7 +172,9 @@ class Player {
   show(number) {
     this.work = this.work.then(async () => {
       this.number = Math.max(this.frames.first || 0, Math.min(number, this.frames.count - 1));
-      await this.timeline.to(this.live ? this.number : Math.floor(this.number));
+      const reached = this.live ? this.number : Math.floor(this.number);
+      await this.timeline.to(reached);
+      if (this.rival) await this.rival.timeline.to(reached);
       await this.paint();
     });
     return this.work;
@@ -194,8 +201,16 @@ class Player {
       this.timeline.frame + 1 < this.frames.count
         ? await this.frames.get(this.timeline.frame + 1)
         : this.frame;
+    this.displaceBy(this.surfaces);
+    this.onCanvas = Math.floor(this.number);
+    this.redraw();
+    this.shown++;
+  }
+
+  // Gives the targets the heights of surfaces, or the recorded ones.
+  displaceBy(surfaces) {
     this.targets.forEach((part, i) => {
-      const heights = this.heightsOf(i);
+      const heights = this.heightsOf(i, surfaces[i]);
       const V = this.frame.vertices[i];
       this.limits[i] = heights.reduce((most, height) => Math.max(most, Math.abs(height)), this.limits[i]);
       displace(
@@ -206,15 +221,11 @@ class Player {
       );
       this.drawing.upload(part);
     });
-    this.onCanvas = Math.floor(this.number);
-    this.redraw();
-    this.shown++;
   }
 
-  // Heights of a target's points [m]: the recorded ones, or those of its waves.
-  heightsOf(target) {
+  // Heights of a target's points [m]: the recorded ones, or those of its surface's waves.
+  heightsOf(target, surface) {
     const steps = this.frame.steps[target];
-    const surface = this.surfaces[target];
     if (steps) return Float32Array.from(steps, step => step * this.meta.steps[target]);
     surface.settle();
     return surface.pointHeights();
@@ -228,19 +239,36 @@ class Player {
     );
     if (this.canvas.width !== width || this.canvas.height !== height)
       Object.assign(this.canvas, {width, height});
-    this.drawing.draw(
-      this.view(width / height),
-      this.bodies(),
-      this.contacts ? this.arrows() : [],
-      this.heat,
-    );
-    if (this.grid) this.drawGrids(width / height);
+    if (this.rival) {
+      this.displaceBy(this.rival.surfaces);
+      this.drawOn(this.rival.surfaces);
+      this.rival.copy(this.canvas);
+      this.displaceBy(this.surfaces);
+    }
+    this.drawOn(this.surfaces);
   }
 
-  drawGrids(aspect) {
+  // What was drawn last, with the rival's beside it.
+  picture() {
+    if (!this.rival) return this.canvas;
+    const {width, height} = this.canvas;
+    const both = Object.assign(document.createElement("canvas"), {width: 2 * width, height});
+    const context = both.getContext("2d");
+    context.drawImage(this.canvas, 0, 0);
+    context.drawImage(this.rival.canvas, width, 0);
+    return both;
+  }
+
+  // Draws what the targets show now, and the grids of their surfaces, on the canvas.
+  drawOn(surfaces) {
+    const view = this.view(this.canvas.width / this.canvas.height);
     const bodies = this.bodies();
-    const {matrix} = this.view(aspect);
-    this.surfaces.forEach(surface => {
+    this.drawing.draw(view, bodies, this.contacts ? this.arrows() : [], this.heat);
+    if (this.grid) this.drawGrids(surfaces, view, bodies);
+  }
+
+  drawGrids(surfaces, {matrix}, bodies) {
+    surfaces.forEach(surface => {
       if (!surface) return;
       surface.grid = surface.grid || new TexelGrid(this.drawing.gl, surface.law);
       surface.grid.draw(

@@ -19,7 +19,10 @@ function programControls(player, ui) {
   of("clock").hidden = true;
   for (const name of stream.operators) of("operator").add(new Option(name, name));
   choiceControls(player, ui);
-  of("operator").onchange = () => player.send("operator", {name: of("operator").value});
+  for (const name of stream.operators) of("compare").add(new Option(name, name));
+  of("operator").value = stream.operator;
+  for (const id of ["operator", "compare"])
+    of(id).onchange = () => player.send(id, {name: of(id).value});
   of("throw").onclick = () => throwBall(player, ui);
   of("record").onclick = () => player.send("record", {camera: cameraEntry(player)});
   of("share").onclick = () => player.send("share");
@@ -63,7 +66,8 @@ function choiceControls(player, ui) {
 // A program that shows a loop of the user's own does less than the viewer.
 function hideWhatIsNot(commands, of) {
   for (const id of ["throw", "record", "share", "save", "quit"]) of(id).hidden = !commands.includes(id);
-  for (const id of ["preset", "look", "operator"]) of(id).parentElement.hidden = !commands.includes(id);
+  for (const id of ["preset", "look", "operator", "compare"])
+    of(id).parentElement.hidden = !commands.includes(id);
   for (const id of ["wave-speed", "damping", "stiffness", "plain"]) {
     const control = of(id).closest("label") || of(id);
     control.hidden = !commands.includes("factors");

@@ -62,8 +62,13 @@ async function arrived(player, data) {
 async function heard(player, ui, message) {
   if (message.say) ui.say(message.say);
   if ("paused" in message) ui.paused(message.paused);
+  if (message.operator) {
+    ui.of("operator").value = message.operator;
+    if (player.rival) player.rival.name(message.operator);
+  }
   if (message.reset) {
     player.timeline.forgetAll();
+    if (player.rival) player.rival.timeline.forgetAll();
     player.following = true;
   }
   if (message.chosen) ui.chosen(message.chosen);
@@ -85,4 +90,18 @@ async function heard(player, ui, message) {
     await player.timeline.to(player.frames.count - 1);
     await player.replaceSurface(message.law.target, JSON.parse(message.law.content));
   }
+  if (message.rival) await compared(player, ui, message.rival);
+}
+
+// Shows the waves of another operator beside the run's, or no longer.
+async function compared(player, ui, {operator, laws}) {
+  ui.of("compare").value = operator;
+  if (player.rival) player.rival.end();
+  player.rival = null;
+  if (operator) {
+    await player.timeline.to(player.frames.count - 1);
+    player.rival = await rivalOf(player, operator, laws);
+    player.rival.name(ui.of("operator").value);
+  }
+  await player.paint();
 }
