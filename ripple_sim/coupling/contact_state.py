@@ -16,8 +16,8 @@ The deficit [N s] is the impulse that averaging has held back: the surface recei
 that nothing is lost. The prepaid impulse [N s] is what the surface has received in the pulse of a
 hit before MuJoCo's contact gives it: the contact's first forces pay for it.
 
-All times are for time steps of 2 ms and contacts with MuJoCo's default time constant; the rest
-filter scales them for others.
+All times are for time steps of at most `TIME_STEP` and contacts with MuJoCo's default time
+constant; the rest filter scales them for others.
 """
 
 from __future__ import annotations
@@ -28,39 +28,43 @@ import numpy as np
 
 from ripple_sim.solver.kernel import Floats, kernel, shared
 
+# The times below hold for time steps of at most this length, MuJoCo's default [s].
+TIME_STEP = 0.002
+# They hold for this time constant of a contact, MuJoCo's default [s].
+DEFAULT_TIME_CONSTANT = 0.02
+
 # A first hit is over within this time [s].
 _ONSET_TIME = 0.1
-# A contact that is open for longer than this, and for more than a step, is gone [s].
+# A contact that is open for longer than this is gone [s]: longer than two steps.
 _GONE_TIME = 0.005
-
-# A contact chatters if it opens again within this time [s] or within this many steps.
+# A contact chatters if it opens again within this time [s].
 _CHATTER_PERIOD = 0.015
-_CHATTER_STEPS = 4
-# It chatters no longer once it has touched without a break for this time [s].
+# A contact chatters no longer once it has touched without a break for this time [s]. The jitter of
+# its place is averaged over the same time.
 _CALM_TIME = 0.5
-# The force of a chattering contact is averaged over this time [s].
-_AVERAGING_TIME = 0.02
+
+# The force of a chattering contact, a spring, is averaged over the spring's time constant [s].
+_AVERAGING_TIME = DEFAULT_TIME_CONSTANT
 # The deficit is paid within about this time [s].
 _PAYING_TIME = 0.25
 
 # The force of a steady contact changes where it differs from its mean by this share.
 _FORCE_CHANGE = 0.05
-# A springy contact is hit where its force is so many times its mean.
-_HIT_RATIO = 4.0
+# What is so many times its mean is no noise: the force of a springy contact is then a hit, and a
+# distance from the mean place a move.
+_OUTLIER_RATIO = 4.0
 
 # The memory grows by this share of the time that passes.
 _MEMORY_GROWTH = 0.4
 # The longest memory [s].
 _LONGEST_MEMORY = 2.0
-# Averaging time of the latest place [s].
-_PLACE_MEMORY = 0.05
-# Averaging time of the jitter of the place [s].
-_JITTER_MEMORY = 0.5
+# Averaging time of the latest place [s]. The mean place is averaged over twice this time at least,
+# and so over the onset.
+_PLACE_MEMORY = _ONSET_TIME / 2
 # Time within which the memory shortens where a contact moves [s].
 _MOVE_TIME = 0.006
-# A contact moves where it is farther from its mean place than this many times its jitter. The
-# distance is bounded from below and from above by these shares of the place radius.
-_MOVE_OVER_JITTER = 4.0
+# The distance at which a contact moves is bounded by these shares of the place radius, from below
+# where it does not chatter, and from above.
 _MIN_MOVE_SHARE = 0.1
 _MAX_MOVE_SHARE = 0.6
 
@@ -98,9 +102,9 @@ ContactState: TypeAlias = Any
 
 
 @shared
-def is_gone(state: ContactState, dt: float) -> bool:
-    """Whether a contact is gone, and not open for a moment only, at a time step [s]."""
-    return state.absent > max(_GONE_TIME, 1.5 * dt)
+def is_gone(state: ContactState) -> bool:
+    """Whether a contact is gone, and not open for a moment only."""
+    return state.absent > _GONE_TIME
 
 
 @shared
@@ -131,16 +135,16 @@ def touch(
     dt : float
         Time step [s].
     """
-    if not state.active or is_gone(state, dt):
+    if not state.active or is_gone(state):
         _begin(state, force, point, place_radius)
     elif state.absent > 0:
-        _close_again(state, dt)
+        _close_again(state)
     state.absent = 0.0
     state.age += dt
     state.unbroken += dt
     state.chatters = state.chatters and state.unbroken < _CALM_TIME
     # a hit passes through the average of a chattering contact
-    is_hit = state.chatters and force > _HIT_RATIO * state.mean_force
+    is_hit = state.chatters and force > _OUTLIER_RATIO * state.mean_force
     hit = force - state.mean_force if is_hit else 0.0
     state.level += dt / (dt + _AVERAGING_TIME) * (force - hit - state.level)
     _follow_force(state, force, dt)
@@ -155,13 +159,13 @@ def miss(state: ContactState, dt: float) -> float:
     state.unbroken += dt
     state.level -= dt / (dt + _AVERAGING_TIME) * state.level
     # a springy contact chatters from its first opening on
-    state.chatters = state.springy and not is_gone(state, dt)
-    if is_gone(state, dt):
+    state.chatters = state.springy and not is_gone(state)
+    if is_gone(state):
         # no contact force will come that pays for the prepaid impulse
         state.deficit -= state.prepaid
         state.prepaid = 0.0
     force = _force_on_surface(state, 0.0, 0.0, dt)
-    state.active = state.deficit != 0 or not is_gone(state, dt)
+    state.active = state.deficit != 0 or not is_gone(state)
     return force
 
 
@@ -181,10 +185,9 @@ def _begin(state: ContactState, force: float, point: Floats, place_radius: float
 
 
 @shared
-def _close_again(state: ContactState, dt: float) -> None:
+def _close_again(state: ContactState) -> None:
     """Close a contact that was open for a moment; it chatters if it has opened before, of late."""
-    opened_soon = state.unbroken < max(_CHATTER_PERIOD, _CHATTER_STEPS * dt)
-    if state.age > _ONSET_TIME and opened_soon:
+    if state.age > _ONSET_TIME and state.unbroken < _CHATTER_PERIOD:
         state.springy = True
     state.chatters = state.springy
     state.unbroken = 0.0
@@ -197,7 +200,7 @@ def _follow_force(state: ContactState, force: float, dt: float) -> None:
     if state.age < _ONSET_TIME:
         sameness = 0.0
     elif state.springy or state.unbroken < _CALM_TIME:
-        sameness = _HIT_RATIO - force / max(state.mean_force, _MIN_FORCE)
+        sameness = _OUTLIER_RATIO - force / max(state.mean_force, _MIN_FORCE)
     else:
         allowed = max(_FORCE_CHANGE * state.mean_force, _MIN_FORCE)
         sameness = 2 - abs(force - state.mean_force) / allowed
@@ -218,10 +221,10 @@ def _follow_place(state: ContactState, point: Floats, place_radius: float, dt: f
         mean_memory = max(2 * _PLACE_MEMORY, state.memory)
         state.mean_place[k] += dt / (dt + mean_memory) * (point[k] - state.mean_place[k])
         lag2 += (state.place[k] - state.mean_place[k]) ** 2
-    state.jitter += dt / (dt + _JITTER_MEMORY) * (np.sqrt(jump2) - state.jitter)
+    state.jitter += dt / (dt + _CALM_TIME) * (np.sqrt(jump2) - state.jitter)
     stays_within = _MAX_MOVE_SHARE * place_radius
     if not state.springy:
-        jitters = max(_MOVE_OVER_JITTER * state.jitter, _MIN_MOVE_SHARE * place_radius)
+        jitters = max(_OUTLIER_RATIO * state.jitter, _MIN_MOVE_SHARE * place_radius)
         stays_within = min(jitters, stays_within)
     if lag2 > stays_within**2:
         beyond = 1 - stays_within / np.sqrt(lag2)
@@ -248,7 +251,7 @@ def _force_on_surface(state: ContactState, force: float, hit: float, dt: float) 
     state.deficit += dt * (force - received)
     if state.deficit != 0:
         share = dt / (dt + _PAYING_TIME)
-        if is_gone(state, dt):
+        if is_gone(state):
             # the rest is paid in even parts
             share = min(1.0, dt / max(_AVERAGING_TIME - state.absent, dt))
         paid = share * state.deficit

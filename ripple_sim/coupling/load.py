@@ -1,8 +1,8 @@
 """From the contacts of a physics step to the loads on the texels of all targets.
 
-The contacts of each step are kept, and the user's records of impulses are made from them when they
-are asked for. Bodies that MuJoCo lets sleep have no contacts in its data; they still press on the
-targets that they lie on.
+The contacts of each step are kept. The user's records of impulses are made from them on request.
+Bodies that MuJoCo lets sleep have no contacts in its data; they still press on the targets that
+they lie on.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from ripple_sim.solver import Atlas, WaveSolver
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 from ripple_sim.solver.waves.load import StepLoad
 
+from .contact_state import DEFAULT_TIME_CONSTANT
 from .contacts import ContactReader, Contacts, first_rows
 from .easing import Easing
 from .energy import Key
@@ -27,7 +28,7 @@ from .hertz import Hits
 from .ids import TargetId, is_geom
 from .model import CoupledModel
 from .patches import Footprints, corners, load_points
-from .rest_filter import DEFAULT_TIME_CONSTANT, NO_FORCES, RestFilter, TexelForces
+from .rest_filter import NO_FORCES, RestFilter, TexelForces
 from .sleep import SLEEP, at_rest
 from .soft import target_pose
 
@@ -294,14 +295,14 @@ class TargetLoad:
         self.set_waves(waves)
 
     def set_waves(self, waves: WaveSolver) -> None:
-        """Go on with new waves on the same atlas; impulses that are yet to be given stay."""
+        """Continue with new waves on the same atlas; impulses that are yet to be given stay."""
         self._waves = waves
         self._atlas = waves.atlas
         self._footprints = Footprints(waves.atlas, waves.operator.movable.reshape(-1))
         self._filter.forget_places()
 
     def take_up_all(self) -> None:
-        """Take up all of every force from now on."""
+        """Take up every force completely from now on."""
         self._easing = None
 
     def touched(
@@ -353,12 +354,11 @@ class TargetLoad:
             inner=inner,
             on_texels=on_texels,
         )
-        self._filter.set_timestep(timestep)
         if data is not None:
             self._begin_hits(touches, timestep, elapsed, data)
-        return self.given(elapsed, on_texels), touches
+        return self.over(elapsed, on_texels), touches
 
-    def given(self, elapsed: float, present: TexelForces = NO_FORCES) -> StepLoad:
+    def over(self, elapsed: float, present: TexelForces = NO_FORCES) -> StepLoad:
         """Load of these forces over a time [s], with the pulses of hits."""
         if self._easing is not None and present is NO_FORCES:
             self._easing.pause(elapsed)
@@ -437,13 +437,13 @@ class TargetLoad:
             return
         contacts = touches.contacts
         geoms, _, _, begins, texels, texel_forces = touches.on_texels
-        for row in self._filter.arrived(geoms, elapsed):
-            mine = slice(begins[row], begins[row + 1])
-            # what a unit of the contact's impulse gives each texel
-            shares = texel_forces[mine] * (elapsed / (timestep * touches.forces[row]))
+        for row in self._filter.arrived(geoms):
+            rows = slice(begins[row], begins[row + 1])
+            # impulse that each texel gets for a unit of the contact's impulse
+            shares = texel_forces[rows] * (elapsed / (timestep * touches.forces[row]))
             pair = contacts.rows(contacts.others == geoms[row])
-            prepaid = self._hits.begin(data, self._atlas, pair, texels[mine], shares)
-            self._filter.prepay(int(geoms[row]), prepaid)
+            prepaid = self._hits.begin(data, self._atlas, pair, texels[rows], shares)
+            self._filter.prepay(int(geoms[row]), prepaid, elapsed)
 
 
 class ContactLoads:
@@ -522,11 +522,11 @@ class ContactLoads:
         self._impulses: list[Impulse] | None = None
 
     def waves_changed(self, target: TargetId) -> None:
-        """Go on with the new waves of a target."""
+        """Continue with the new waves of a target."""
         self._targets[target].set_waves(self._waves[target])
 
     def take_up_all(self, target: TargetId) -> None:
-        """Take up all of every force on a target from now on."""
+        """Take up every force on a target completely from now on."""
         self._easings.pop(target, None)
         self._targets[target].take_up_all()
 
@@ -543,7 +543,7 @@ class ContactLoads:
             contacts = self._with_sleeping(data, contacts)
         for target, target_load in self._targets.items():
             if target not in contacts:
-                loads[target] = target_load.given(elapsed)
+                loads[target] = target_load.over(elapsed)
                 continue
             pose = target_pose(data, target)
             loads[target], touches = target_load.touched(

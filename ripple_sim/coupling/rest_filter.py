@@ -16,12 +16,17 @@ import numpy as np
 from ripple_sim.solver import Load
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 
-from .contact_state import CONTACT_STATE, ContactState, is_gone, miss, touch, turn
+from .contact_state import (
+    CONTACT_STATE,
+    DEFAULT_TIME_CONSTANT,
+    TIME_STEP,
+    ContactState,
+    is_gone,
+    miss,
+    touch,
+    turn,
+)
 
-# The times of `contact_state` hold for this time step, MuJoCo's default [s].
-_TIME_STEP = 0.002
-# They hold for this time constant of a contact, MuJoCo's default [s].
-DEFAULT_TIME_CONSTANT = 0.02
 # Shares below this are dropped from the mean shares of a geom.
 _MIN_SHARE = 1e-6
 
@@ -53,13 +58,14 @@ class TexelForces(NamedTuple):
     forces: Floats
 
 
+# The forces of a step in which nothing touches the target.
 NO_FORCES = TexelForces(
-    np.zeros(0, np.int64),
-    np.zeros((0, 3)),
-    np.zeros(0),
-    np.zeros(1, np.int64),
-    np.zeros(0, np.int64),
-    np.zeros(0),
+    geoms=np.zeros(0, np.int64),
+    middles=np.zeros((0, 3)),
+    place_radii=np.zeros(0),
+    begins=np.zeros(1, np.int64),
+    texels=np.zeros(0, np.int64),
+    forces=np.zeros(0),
 )
 
 
@@ -116,26 +122,19 @@ class RestFilter:
         """Restart the average, for instance because other texels carry loads than before."""
         self._states["memory"] = 0.0
 
-    def set_timestep(self, timestep: float) -> None:
-        """Scale all times for physics steps of this length [s]."""
-        scale = max(timestep / _TIME_STEP, self._time_constant / DEFAULT_TIME_CONSTANT)
-        if scale != self._time_scale:
-            for name in ("deficit", "prepaid"):
-                self._states[name] *= self._time_scale / scale
-            self._time_scale = scale
-
-    def arrived(self, geoms: Ints, dt: float) -> list[int]:
-        """Which rows of geoms that touch over a time [s] did not before."""
-        scaled_dt = dt / self._time_scale
+    def arrived(self, geoms: Ints) -> list[int]:
+        """Which rows of geoms that touch did not touch before."""
         states = list(self._states[geoms])
-        return [
-            row for row, state in enumerate(states) if not state.active or is_gone(state, scaled_dt)
-        ]
+        return [row for row, state in enumerate(states) if not state.active or is_gone(state)]
 
-    def prepay(self, geom: int, impulse: float) -> None:
-        """Note an impulse [N s], positive inwards, that came before the contact of a geom."""
+    def prepay(self, geom: int, impulse: float, dt: float) -> None:
+        """Note an impulse [N s], positive inwards, that came before the contact of a geom.
+
+        `dt` is the time step in which the geom arrives [s].
+        """
         if not impulse:
             return
+        self._scale_times(dt)
         state = self._states[geom]
         side = np.sign(impulse)
         state.deficit = side * state.side * state.deficit
@@ -146,6 +145,7 @@ class RestFilter:
         """Load of these forces over a time [s]."""
         if self._all_gone and not len(present.geoms):
             return Load.none()
+        self._scale_times(dt)
         size = len(self._texels) + len(present.texels)
         shares = _Shares(
             texels=np.empty(size, np.int64),
@@ -159,6 +159,14 @@ class RestFilter:
         self._texels = shares.texels[:count]
         self._mean_shares = shares.mean[:count]
         return Load(self._texels, shares.latest[:count])
+
+    def _scale_times(self, dt: float) -> None:
+        """Scale all times for a time step [s] and for the time constant of the contacts."""
+        scale = max(dt / TIME_STEP, self._time_constant / DEFAULT_TIME_CONSTANT)
+        if scale != self._time_scale:
+            for name in ("deficit", "prepaid"):
+                self._states[name] *= self._time_scale / scale
+            self._time_scale = scale
 
 
 @kernel
@@ -235,11 +243,11 @@ def _fade(
     end: int,
 ) -> int:
     """Enter a geom's earlier mean shares from `end` on, scaled to a sum; return the new end."""
-    whole = 0.0
+    sum_before = 0.0
     for i in range(state.first, state.last):
         if mean_shares[i] > _MIN_SHARE:
-            whole += mean_shares[i]
-    scale = sum_of_shares / whole
+            sum_before += mean_shares[i]
+    scale = sum_of_shares / sum_before
     for i in range(state.first, state.last):
         if mean_shares[i] > _MIN_SHARE:
             out.texels[end] = texels[i]
