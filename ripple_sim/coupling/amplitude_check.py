@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+import itertools
 import math
 from collections.abc import Collection, Mapping
 
@@ -31,14 +32,14 @@ _ALLOWED_HEIGHT = 0.25
 # the dent, and the ring that leaves the dent is lower.
 _DENT_FACTOR = 3.0
 
-# A texel lies under a body for this many checks after a body pressed a texel within the radius of
-# the footprint.
+# A texel lies under a body for so many checks after a body has pressed a texel within the radius of
+# its footprint.
 _DENT_LOOKS = 3
 
 # Share of the texels for the limit "where the object is thinnest": the rest may be thinner.
 _THINNEST_SHARE = 0.99
 
-# Slopes are measured on one row in this many.
+# Slopes are measured on one row of so many.
 _ROW_STRIDE = 4
 
 # Slopes above 1 are reported if they are on more than this share of the surface: a pit under a
@@ -96,13 +97,13 @@ def scales_of(atlas: Atlas) -> tuple[Floats32, float, float]:
 
 def steep_area(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
     """Share of the surface that is steeper than 1, seen on every fourth row."""
-    here = np.s_[:, :-1:_ROW_STRIDE, :-1]
-    below = np.s_[:, 1::_ROW_STRIDE, :-1]
-    beside = np.s_[:, :-1:_ROW_STRIDE, 1:]
-    down = (height[below] - height[here]) * per_row[here]
-    right = (height[beside] - height[here]) * per_column[here]
-    seen = share[here].astype(np.float64)
-    return float(seen[down**2 + right**2 > 1].sum() / seen.sum())
+    texel = np.s_[:, :-1:_ROW_STRIDE, :-1]
+    texel_below = np.s_[:, 1::_ROW_STRIDE, :-1]
+    texel_right = np.s_[:, :-1:_ROW_STRIDE, 1:]
+    slope_down = (height[texel_below] - height[texel]) * per_row[texel]
+    slope_right = (height[texel_right] - height[texel]) * per_column[texel]
+    shares = share[texel].astype(np.float64)
+    return float(shares[slope_down**2 + slope_right**2 > 1].sum() / shares.sum())
 
 
 class AmplitudeCheck:
@@ -140,7 +141,7 @@ class AmplitudeCheck:
         self._steps += 1
 
     def note_load(self, target: TargetId, texels: Ints) -> None:
-        """Take note of the texels that bodies press in this step, flat indices [k]."""
+        """Note the texels that bodies press in this step, flat indices [k]."""
         if target in self._watched:
             self._watched[GeomId(target)].note_load(texels)
 
@@ -168,11 +169,12 @@ class AmplitudeCheck:
                 self._warn(geom)
 
     def _warn(self, geom: GeomId) -> None:
+        """Warn of the waves on a geom, and stop to watch it."""
         watch = self._watched.pop(geom)
         target = self._coupled.names[geom]
         advice = self._advice(geom, watch.waves, _DENSITY_MARGIN * watch.needed)
         warn_caller(
-            f"the waves on geom {target!r} are {watch.what}; pictures show them limited. {advice}"
+            f"the waves on geom {target!r} are {watch.fault}; pictures show them limited. {advice}"
         )
 
     def _advice(self, geom: GeomId, waves: WaveSolver, factor: float) -> str:
@@ -206,15 +208,15 @@ class _WatchedTarget:
         Greatest height and slope over the allowed ones.
     needed : float
         Factor by which waves would have to be lower.
-    what : str
-        Words for the warning: the excess, its size and its place.
+    fault : str
+        Words for the warning: whether the waves are too high or too steep, by how much, and where.
     """
 
     def __init__(self, waves: WaveSolver) -> None:
         self.waves = waves
         self.excess = 0.0
         self.needed = 0.0
-        self.what = ""
+        self.fault = ""
         # checks since the waves were first too high or too steep
         self._looks = 0
         # waves up to this height need no check [m]
@@ -226,13 +228,13 @@ class _WatchedTarget:
         self._loaded_before = collections.deque[list[Ints]](maxlen=_DENT_LOOKS - 1)
 
     def note_load(self, texels: Ints) -> None:
-        """Take note of the texels that bodies press in this step, flat indices [k]."""
+        """Note the texels that bodies press in this step, flat indices [k]."""
         self._loaded.append(texels)
 
     def look(self, is_eased: bool = False) -> bool:
-        """Check the waves; True if they are too high or too steep, and the warning is due.
+        """Check the waves; return whether they are too high or too steep, and the warning is due.
 
-        If forces are eased, heights count that more than `_MIN_AREA` of the surface exceeds.
+        If forces are eased, the height is judged that `_MIN_AREA` of the surface exceeds.
         """
         excess = 0.0
         crests = self.waves.crests()
@@ -254,22 +256,22 @@ class _WatchedTarget:
         (per_limit, per_row, per_column, share), per_thinnest = self._scales
         rings = self._rings(crests, per_limit)
         # rings over the greatest allowed heights
-        over = (rings * per_limit).reshape(-1)
-        texel = int(over.argmax())
-        if is_eased and over[texel] > 1:
-            texel = _exceeded_at(over, share)
-        high = float(over[texel])
+        height_excesses = (rings * per_limit).reshape(-1)
+        texel = int(height_excesses.argmax())
+        if is_eased and height_excesses[texel] > 1:
+            texel = _exceeded_at(height_excesses, share)
+        height_excess = float(height_excesses[texel])
         steep_share = steep_area(height, per_row, per_column, share)
-        steep = 0.0
+        slope = 0.0
         if steep_share > _MIN_AREA:
-            steep = _steepness(height, per_row, per_column, share)
-        excess = max(high, steep)
+            slope = _steepness(height, per_row, per_column, share)
+        excess = max(height_excess, slope)
         if excess > max(self.excess, 1.0):
-            if high > 1:
+            if height_excess > 1:
                 limit = 1 / float(per_limit.reshape(-1)[texel])
-                self.what = self._too_high(texel, float(crests.reshape(-1)[texel]), limit)
+                self.fault = self._too_high(texel, float(crests.reshape(-1)[texel]), limit)
             else:
-                self.what = f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
+                self.fault = f"too steep: a slope of {slope:.2g} or more on {steep_share:.1%} of it"
         self.excess = max(self.excess, excess)
         spread = _SPREAD_SHARE * float(rings.max()) * per_thinnest
         self.needed = max(self.needed, excess, spread)
@@ -279,33 +281,38 @@ class _WatchedTarget:
         self, crests: NDArray[np.float32], per_limit: NDArray[np.float32]
     ) -> NDArray[np.float32]:
         """Crests [C, n, n], with dents under bodies made lower, as they may be deeper [m]."""
-        loads = [texels for step in (*self._loaded_before, self._loaded) for texels in step]
+        # the texels of each load of the latest steps
+        loads = list(itertools.chain(*self._loaded_before, self._loaded))
         high = np.flatnonzero(crests * per_limit > 1)
         if not loads or not len(high):
             return crests
         areas = self.waves.rest.areas.reshape(-1)
         positions = self.waves.rest.positions.reshape(-1, 3)
+        # of a disc with the area of the largest load [m]
         radius = max(np.sqrt(areas[texels].sum() / np.pi) for texels in loads)
-        loaded = cKDTree(positions[np.unique(np.concatenate(loads))])
-        distances, _ = loaded.query(positions[high], distance_upper_bound=radius)
+        loaded_places = cKDTree(positions[np.unique(np.concatenate(loads))])
+        distances, _ = loaded_places.query(positions[high], distance_upper_bound=radius)
+        is_under_body = np.isfinite(distances)
         rings = crests.copy()
-        rings.reshape(-1)[high[np.isfinite(distances)]] /= np.float32(_DENT_FACTOR)
+        rings.reshape(-1)[high[is_under_body]] /= np.float32(_DENT_FACTOR)
         return rings
 
     def _too_high(self, texel: int, crest: float, limit: float) -> str:
-        place = self.waves.rest.positions.reshape(-1, 3)[texel]
-        where = ", ".join(f"{x:.3g}" for x in place)
+        """Words for a crest [m] at a texel that is above its limit [m]."""
+        position = self.waves.rest.positions.reshape(-1, 3)[texel]
+        coordinates = ", ".join(f"{x:.3g}" for x in position)
         radius = limit / _ALLOWED_HEIGHT
         return (
-            f"too high: {crest:.2g} m at ({where}) m, where the object's radius is {radius:.2g} m"
+            f"too high: {crest:.2g} m at ({coordinates}) m, where the object's radius is "
+            f"{radius:.2g} m"
         )
 
 
 def _steepness(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
     """The slope that `_MIN_AREA` of the surface exceeds."""
-    down = np.diff(height, axis=1, append=0) * per_row
-    right = np.diff(height, axis=2, append=0) * per_column
-    slope = np.hypot(down, right).ravel()
+    slope_down = np.diff(height, axis=1, append=0) * per_row
+    slope_right = np.diff(height, axis=2, append=0) * per_column
+    slope = np.hypot(slope_down, slope_right).ravel()
     return float(slope[_exceeded_at(slope, share)])
 
 

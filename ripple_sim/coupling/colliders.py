@@ -64,6 +64,9 @@ _MAX_CORNER_SHIFT = 2.0
 # they leave open.
 _ISOTROPIC_WEIGHT = 1e-3
 
+# Depth at which rays to the other side start, over the depth by which vertices move.
+_RAY_START = 1e-3
+
 # Share of the local thickness by which vertices move at most, so that opposite sides of a thin part
 # stay apart.
 _MAX_INSET_SHARE = 0.45
@@ -122,29 +125,29 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
         raise SceneError(
             f"collision route must be one of {', '.join(map(repr, ROUTES))}, got {route!r}"
         )
-    found = _find(spec, geom)
-    is_mesh = bool(found.meshname)
+    spec_geom = _find(spec, geom)
+    is_mesh = bool(spec_geom.meshname)
     if is_mesh and route == "auto":
-        model = _compiled(spec, found)
-        route = "sdf" if target_mesh(model, model.geom(found.name).id).closed else "flex"
+        model = _compiled(spec, spec_geom)
+        route = "sdf" if target_mesh(model, model.geom(spec_geom.name).id).closed else "flex"
     # what can fail comes first: then nothing has been changed
-    core = flex_core(mesh_on_body(spec, found)) if is_mesh and route == "flex" else None
-    parts = convex_parts(mesh_on_body(spec, found)) if is_mesh and route == "convex" else None
+    core = flex_core(mesh_on_body(spec, spec_geom)) if is_mesh and route == "flex" else None
+    parts = convex_parts(mesh_on_body(spec, spec_geom)) if is_mesh and route == "convex" else None
     if not is_mesh or route in ("convex", "hull"):
         spec.option.enableflags |= SPECULATIVE
     if is_mesh:
-        _remove_colliders(spec, found)
-        found.type = _GEOM.mjGEOM_SDF if route == "sdf" else _GEOM.mjGEOM_MESH
-    if not (found.contype or found.conaffinity):
-        found.contype = 1
-        found.conaffinity = 1
+        _remove_colliders(spec, spec_geom)
+        spec_geom.type = _GEOM.mjGEOM_SDF if route == "sdf" else _GEOM.mjGEOM_MESH
+    if not (spec_geom.contype or spec_geom.conaffinity):
+        spec_geom.contype = 1
+        spec_geom.conaffinity = 1
     if is_mesh and route == "sdf":
-        _enlarge_sdf_search(spec, found.name)
+        _enlarge_sdf_search(spec, spec_geom.name)
     if core is not None:
-        add_flex_collider(spec, found, core)
+        add_flex_collider(spec, spec_geom, core)
     if parts is not None:
-        add_convex_collider(spec, found, parts)
-    return found
+        add_convex_collider(spec, spec_geom, parts)
+    return spec_geom
 
 
 def _enlarge_sdf_search(spec: mujoco.MjSpec, name: str) -> None:
@@ -160,16 +163,16 @@ def _enlarge_sdf_search(spec: mujoco.MjSpec, name: str) -> None:
 
 
 def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
-    """The geom of a name, or of a place among the geoms of its body, which it is then called by."""
-    found = spec.geom(key)
-    if found is not None:
-        return found
+    """The geom of a name, or of "body/index"; in the second case an unnamed geom gets that name."""
+    named_geom = spec.geom(key)
+    if named_geom is not None:
+        return named_geom
     body_name, _, index = key.rpartition("/")
     body = spec.body(body_name) if body_name else None
     if body is not None and index.isdecimal() and int(index) < len(body.geoms):
-        found = body.geoms[int(index)]
-        found.name = found.name or key
-        return found
+        geom = body.geoms[int(index)]
+        geom.name = geom.name or key
+        return geom
     names = ", ".join(repr(other.name) for other in spec.geoms if other.name)
     raise SceneError(
         f"the specification has no geom {key!r}; its named geoms are {names or 'none'}"
@@ -200,7 +203,7 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
         mark_used(path)
         return [stored[str(i)] for i in range(len(stored))]
     parts = _decomposed(mesh)
-    # a folder that cannot be written costs the next call its time, nothing else
+    # if the folder cannot be written, the next call takes as long, and nothing else is lost
     with (
         contextlib.suppress(OSError),
         atomic_write(path) as unfinished,
@@ -238,13 +241,17 @@ def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
 
 
 def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:
+    """The compiled model of a copy of a specification, in which a geom does not collide.
+
+    A geom that collides would need a signed distance, which takes long, or a convex hull, which a
+    flat mesh does not have.
+    """
     trial = spec.copy()
-    # a signed distance would take long, and a flat mesh has no convex hull
     trial.compiler.discardvisual = False
-    own = trial.geom(geom.name)
-    own.type = mujoco.mjtGeom.mjGEOM_MESH
-    own.contype = 0
-    own.conaffinity = 0
+    trial_geom = trial.geom(geom.name)
+    trial_geom.type = mujoco.mjtGeom.mjGEOM_MESH
+    trial_geom.contype = 0
+    trial_geom.conaffinity = 0
     try:
         return trial.compile()
     except ValueError as error:
@@ -389,8 +396,10 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
     outward = (1 + _ISOTROPIC_WEIGHT) * np.linalg.solve(squares, sums[:, :, None])[:, :, 0]
     length = np.maximum(np.linalg.norm(outward, axis=1), np.finfo(np.float64).tiny)
     outward /= length[:, None]
-    # to the other side of the mesh, infinite where there is none [m]
-    thickness = 1e-3 * depth + RayScene(V, F).cast(V - 1e-3 * depth * outward, -outward)[1]
+    # to the other side of the mesh, infinite where there is none [m]; rays start inside
+    start_depth = _RAY_START * depth
+    _, distances, _, _ = RayScene(V, F).cast(V - start_depth * outward, -outward)
+    thickness = start_depth + distances
     shift = depth * np.minimum(length, _MAX_CORNER_SHIFT)
     shift = np.minimum(shift, _MAX_INSET_SHARE * thickness)
     return V - shift[:, None] * outward

@@ -105,12 +105,13 @@ def find_collision_geoms(
         free[list(geoms)] = False
     solids_by_target: dict[GeomId, tuple[GeomId, ...]] = {}
     for target in targets:
-        own = (target,) if collides[target] else ()
-        if own or target in named:
-            solids_by_target[target] = tuple(dict.fromkeys((*own, *named.get(target, ()))))
-        else:
+        solids = [*named.get(target, ())]
+        if collides[target]:
+            solids.insert(0, target)
+        elif target not in named:
             kin = _kin(model, target, free)
-            solids_by_target[target] = tuple(map(geom_id, np.flatnonzero(kin).tolist()))
+            solids = [geom_id(geom) for geom in np.flatnonzero(kin).tolist()]
+        solids_by_target[target] = tuple(dict.fromkeys(solids))
     return solids_by_target
 
 
@@ -132,5 +133,6 @@ def _in_box(model: mujoco.MjModel, target: GeomId) -> NDArray[np.bool_]:
     rotation = data.geom_xmat.reshape(-1, 3, 3)
     box = model.geom_aabb
     middles = data.geom_xpos + np.einsum("gij,gj->gi", rotation, box[:, :3])
-    away = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
-    return (np.abs(away) <= box[target, 3:]).all(axis=1)
+    # from the middle of the target's box, in the frame of the target [m]
+    offsets = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
+    return (np.abs(offsets) <= box[target, 3:]).all(axis=1)

@@ -1,7 +1,7 @@
 """MuJoCo's contacts as arrays: what touches each target, where, and with how much force.
 
-A `ContactReader` reads them from MuJoCo's data at every step. Contacts of geoms that collide in
-place of a target are handed to it, at places on its surface.
+A `ContactReader` reads the contacts from MuJoCo's data at every step. The contacts of a geom that
+collides in place of a target are handed to that target, at places on its surface.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _PYRAMIDAL = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
 _INCLUDED = 0
 _IN_GAP = 1
 
-# Distance of the points on which contacts are taken to act, over the depth of the overlap: half the
-# depth is on the surface.
+# Distance of the points on which contacts act from MuJoCo's contact points, over the depth of the
+# overlap: half the depth is on the surface.
 _OUTSIDE = 1.5
 
 # Cosine between the normals of a contact and of the surface, above which the surface faces the
@@ -60,10 +60,13 @@ class Contacts(NamedTuple):
     forces: Floats
     normals: Floats
 
-    def rows(self, which: slice | NDArray) -> Contacts:
-        """Some of the contacts."""
+    def rows(self, rows: slice | NDArray) -> Contacts:
+        """Some of the contacts, by a slice, a mask or indices."""
         return Contacts(
-            self.others[which], self.points[which], self.forces[which], self.normals[which]
+            others=self.others[rows],
+            points=self.points[rows],
+            forces=self.forces[rows],
+            normals=self.normals[rows],
         )
 
     def by_other(self) -> dict[ColliderId, Contacts]:
@@ -81,9 +84,9 @@ class Contacts(NamedTuple):
             yield int(ids[first]), self.rows(slice(first, last))
 
     @classmethod
-    def together(cls, parts: Sequence[Contacts]) -> Contacts:
-        """Several on one target, sorted by what touches it."""
-        joined = cls(*map(np.concatenate, zip(*parts, strict=True)))
+    def together(cls, groups: Sequence[Contacts]) -> Contacts:
+        """Groups of contacts on one target as one, sorted by what touches the target."""
+        joined = cls(*map(np.concatenate, zip(*groups, strict=True)))
         return joined.rows(np.argsort(joined.others, kind="stable"))
 
 
@@ -121,11 +124,11 @@ def pair_rows(
     targets, others : int64 [k]
         Collider ids.
     """
-    # the two sides of a contact stand together: of row i the other is i ^ 1
-    both = colliders.astype(np.int64).ravel()
-    rows = np.flatnonzero(is_target[both] & np.repeat(bears, 2))
-    targets = both[rows]
-    others = both[rows ^ 1]
+    # two rows for each contact, one for each side: the other side of row i is row i ^ 1
+    sides = colliders.astype(np.int64).ravel()
+    rows = np.flatnonzero(is_target[sides] & np.repeat(bears, 2))
+    targets = sides[rows]
+    others = sides[rows ^ 1]
     order = np.lexsort((others, targets))
     order = order[np.minimum(targets, others)[order] >= 0]
     rows = rows[order]
@@ -319,7 +322,7 @@ def places_facing(
 @kernel
 def _nearest_facing(positions: Floats, outward: Floats, points: Floats, normals: Floats) -> Ints:
     """Nearest texel to each point that faces the point's normal, [k]; -1 without one."""
-    found = np.full(len(points), -1)
+    nearest = np.full(len(points), -1)
     for i in range(len(points)):
         least = np.inf
         for texel in range(len(positions)):
@@ -330,8 +333,8 @@ def _nearest_facing(positions: Floats, outward: Floats, points: Floats, normals:
                 along += outward[texel, k] * normals[i, k]
             if distance2 < least and along > _MIN_FACING_COSINE:
                 least = distance2
-                found[i] = texel
-    return found
+                nearest[i] = texel
+    return nearest
 
 
 class ContactReader:
@@ -386,7 +389,7 @@ class ContactReader:
     def _geom_contacts(
         self, data: mujoco.MjData, colliders: NDArray[np.integer]
     ) -> dict[TargetId, Contacts]:
-        """Contacts of what collides without a flex collider, by its own id, in ascending order.
+        """Contacts of colliders without a flex collider, by collider id, in ascending order.
 
         Triangles of a flex that touches push sideways in pairs: the forces of such a pair are
         scaled to add up to the length of their vector sum, as for the flex; see `FlexContacts`.
@@ -395,8 +398,10 @@ class ContactReader:
         pulls = adhesion(self._coupled.model, data)
         bears = data.contact.efc_address >= 0
         if pulls is not None:
-            bears |= pulls > 0  # those within the gap pull without a row in the constraint solver
-        rows = contacts, *_ = pair_rows(colliders, bears, self._is_read)
+            # contacts within the gap pull without a row in the constraint solver
+            bears |= pulls > 0
+        rows = pair_rows(colliders, bears, self._is_read)
+        contacts = rows[0]
         if not len(contacts):
             return {}
         forces = normal_forces(model, data, contacts)
@@ -409,9 +414,8 @@ class ContactReader:
         )
         touching = Contacts(others, points, forces[pushing], normals)
         if pulls is not None or self._coupled.has_flex[others].any():
-            factors = self._pair_factors(
-                targets, touching, None if pulls is None else pulls[contacts]
-            )
+            contact_pulls = None if pulls is None else pulls[contacts]
+            factors = self._pair_factors(targets, touching, contact_pulls)
             touching = touching._replace(forces=factors * touching.forces).rows(factors != 0)
             targets = targets[factors != 0]
         return touching.by_target(targets)
@@ -419,7 +423,7 @@ class ContactReader:
     def _pair_factors(self, targets: Ints, touching: Contacts, pulls: Floats | None) -> Floats:
         """Factors, [k], after which the forces of each pair add up to the force that it bears.
 
-        Without its pulls, and with a flex as vectors.
+        The pulls of sticky geoms are taken off. Forces of a flex are added up as vectors.
 
         Parameters
         ----------
@@ -427,18 +431,18 @@ class ContactReader:
             Target of each contact, ascending.
         touching : Contacts
         pulls : float64 [k], optional
-            Of each contact [N]; its force contains the pull twice.
+            Pull of each contact [N]; its force contains the pull twice.
         """
         others = touching.others
         forces = touching.forces
         starts = first_rows(targets, others)
-        whole = np.add.reduceat(forces, starts)
+        force_sums = np.add.reduceat(forces, starts)
         factors = np.ones(len(starts))
         if pulls is not None:
-            factors -= 2 * np.add.reduceat(pulls, starts) / whole
+            factors -= 2 * np.add.reduceat(pulls, starts) / force_sums
         vector_sums = np.add.reduceat(forces[:, None] * touching.normals, starts)
         amounts = np.linalg.norm(vector_sums, axis=1)
-        factors *= np.where(self._coupled.has_flex[others[starts]], amounts / whole, 1.0)
+        factors *= np.where(self._coupled.has_flex[others[starts]], amounts / force_sums, 1.0)
         return np.repeat(factors, np.diff(np.append(starts, len(forces))))
 
     def _flex_contacts(
@@ -449,22 +453,24 @@ class ContactReader:
         flexes = self._flexes
         if flexes is None:
             return {}
-        rows = contacts, _, targets, others = pair_rows(
-            colliders, data.contact.efc_address >= 0, flexes.is_target
-        )
+        bears = data.contact.efc_address >= 0
+        rows = pair_rows(colliders, bears, flexes.is_target)
+        contacts, _, targets, others = rows
         if not len(contacts):
             return {}
         normal = normal_forces(model, data, contacts) - data.contact.adhesion[contacts]
         friction = friction_forces(model, data, contacts)
         forces = np.column_stack([normal, friction])
-        kept, *loads = flexes.loads(data, *rows, first_rows(targets, others), forces)
-        return Contacts(others[kept], *loads).by_target(targets[kept])
+        starts = first_rows(targets, others)
+        shares, points, shared_forces, normals = flexes.loads(data, *rows, starts, forces)
+        touching = Contacts(others[shares], points, shared_forces, normals)
+        return touching.by_target(targets[shares])
 
     def _hand_over(self, data: mujoco.MjData, contacts: dict[TargetId, Contacts]) -> None:
         """Hand the contacts of each collision geom to its target, or to the nearest of several."""
         geoms = sorted(self._targets_of.keys() & contacts.keys())
-        of_geoms = {geom: contacts.pop(geom) for geom in geoms}
-        for geom, on_geom in of_geoms.items():
+        contacts_of_geoms = {geom: contacts.pop(geom) for geom in geoms}
+        for geom, on_geom in contacts_of_geoms.items():
             targets = self._targets_of[geom]
             places = [self._places_on(data, target, on_geom) for target in targets]
             distances = np.linalg.norm(np.array(places) - on_geom.points, axis=2)

@@ -17,17 +17,17 @@ from .ids import FlexId, GeomId
 from .model import CoupledModel
 from .target_warnings import CLOSED_ADVICE
 
-# Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push
-# sideways: geoms that hit an edge or a corner push at down to 0.5.
+# Up to this cosine between the normals of a contact and of the surface MuJoCo counts as pushing
+# sideways. The cosine is 0.5 or more for geoms that hit an edge or a corner.
 _MAX_SIDEWAYS_COSINE = 0.1
 
 # Share of the forces on a target that may be pushes sideways.
 _MAX_UNEXPLAINED = 0.01
 
-# Forces of past steps count less by this factor with each step.
+# Factor by which forces of past steps count less with each step.
 _MEMORY = 0.99
 
-# Lengths of normals are divided by no less than this.
+# Keeps a division by the length of a normal finite [m^2].
 _MIN_LENGTH = np.finfo(np.float64).tiny
 
 
@@ -73,8 +73,8 @@ class FlexContacts:
             self._first[geom] = first
             self.is_target[geom] = True
             self._is_sheet[geom] = not mesh.closed
-        # amounts of the sums of forces on each target [N], and the part of them that neither a
-        # normal force nor friction explains
+        # amounts of the sums of forces on each target [N], and the part of the amounts that neither
+        # a normal force nor friction explains
         self._amounts = np.zeros((ids, 2))
         self._warned = set[int]()
 
@@ -100,54 +100,84 @@ class FlexContacts:
         starts : int64 [p]
             The first of each pair.
         along : float64 [k, 3]
-            Their forces along the axes of their frames [N].
+            Forces of the contacts along the axes of their frames [N].
 
         Returns
         -------
-        kept : bool [k]
-            Which contacts share in the force of their pair.
+        shares : bool [k]
+            Whether a contact has a share in the force of its pair.
         points, forces, normals
-            Of the contacts that are kept; see `Contacts`.
+            Of the contacts that have a share; see `Contacts`.
         """
         contact = data.contact
         counts = np.diff(np.append(starts, len(contacts)))
         frames = contact.frame[contacts].reshape(-1, 3, 3)
+        # -1 where the first axis of the frame points away from the target
         sign = np.where(sides == 1, 1.0, -1.0)[:, None]
         outward = -sign * frames[:, 0]
-        rotations = data.geom_xmat[targets].reshape(-1, 3, 3)
         elements = contact.elem[contacts, sides]
-        normals = np.einsum("kij,kj->ki", rotations, self._normals[self._first[targets] + elements])
-        # a plane touches vertices, which are no element, and its own normal is right
-        normals = np.where(elements[:, None] >= 0, normals, outward)
-        straight = np.einsum("ij,ij->i", outward, normals)
-        behind = self._is_sheet[targets] & (straight < 0)
-        normals[behind] = -normals[behind]
-        straight[behind] = -straight[behind]
-        kept = (along[:, 0] > 0) & (straight > _MAX_SIDEWAYS_COSINE)
-        pushes = np.where(kept, along[:, 0], 0.0)
-        whole = np.add.reduceat(sign * np.einsum("ki,kij->kj", along, frames), starts)
-        mean = np.add.reduceat(pushes[:, None] * outward, starts)
-        length = np.linalg.norm(mean, axis=1)
-        along_mean = -np.einsum("ij,ij->i", whole, mean)
-        force = np.where(length > 0, along_mean / np.where(length > 0, length, 1.0), 0.0)
-        friction = np.where(
-            contact.dim[contacts] > 1, contact.friction[contacts, :2].max(axis=1), 0.0
-        )
+        normals, cosines = self._surface_normals(data, targets, elements, outward)
+        shares = (along[:, 0] > 0) & (cosines > _MAX_SIDEWAYS_COSINE)
+        pushes = np.where(shares, along[:, 0], 0.0)
+        # the force of each pair: its vector sum, and its part along the mean normal
+        force_sums = np.add.reduceat(sign * np.einsum("ki,kij->kj", along, frames), starts)
+        mean_normals = np.add.reduceat(pushes[:, None] * outward, starts)
+        lengths = np.linalg.norm(mean_normals, axis=1)
+        along_mean = -np.einsum("ij,ij->i", force_sums, mean_normals)
+        pair_forces = np.where(lengths > 0, along_mean / np.where(lengths > 0, lengths, 1.0), 0.0)
+        has_friction = contact.dim[contacts] > 1
+        friction = np.where(has_friction, contact.friction[contacts, :2].max(axis=1), 0.0)
         self._judge(
             targets[starts],
-            force,
-            np.linalg.norm(whole, axis=1),
+            pair_forces,
+            np.linalg.norm(force_sums, axis=1),
             np.maximum.reduceat(friction, starts),
         )
-        kept &= np.repeat(force > 0, counts)
-        weights = np.where(kept, pushes * straight**2, 0.0)
-        sums = np.add.reduceat(weights, starts)
-        forces = weights * np.repeat(force / np.where(sums > 0, sums, 1.0), counts)
-        # from the other geom's surface, which is in by a depth, to as far outside the target's own
-        depth = contact.includemargin[contacts] - contact.dist[contacts]
-        outside = depth + np.minimum(depth, self._extents[others])
-        met = contact.pos[contacts] - sign * contact.dist[contacts, None] / 2 * frames[:, 0]
-        return kept, (met + outside[:, None] * normals)[kept], forces[kept], normals[kept]
+        shares &= np.repeat(pair_forces > 0, counts)
+        weights = np.where(shares, pushes * cosines**2, 0.0)
+        weight_sums = np.add.reduceat(weights, starts)
+        force_per_weight = pair_forces / np.where(weight_sums > 0, weight_sums, 1.0)
+        forces = weights * np.repeat(force_per_weight, counts)
+        # from the surface of the other geom, which has sunk in by a depth, to a place that is as
+        # far outside the surface of the target
+        depths = contact.includemargin[contacts] - contact.dist[contacts]
+        steps_outwards = depths + np.minimum(depths, self._extents[others])
+        half_gaps = contact.dist[contacts, None] / 2
+        on_other = contact.pos[contacts] - sign * half_gaps * frames[:, 0]
+        points = on_other + steps_outwards[:, None] * normals
+        return shares, points[shares], forces[shares], normals[shares]
+
+    def _surface_normals(
+        self, data: mujoco.MjData, targets: Ints, elements: Ints, outward: Floats
+    ) -> tuple[Floats, Floats]:
+        """Unit normals of the triangles that are touched, in the world, on the side of the contact.
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+        targets : int64 [k]
+            Target of each contact.
+        elements : int64 [k]
+            Triangle of each contact within its flex; -1 for a vertex.
+        outward : float64 [k, 3]
+            Normals of the contacts, from the targets outwards.
+
+        Returns
+        -------
+        normals : float64 [k, 3]
+        cosines : float64 [k]
+            Between the normals of the contacts and of the triangles.
+        """
+        rotations = data.geom_xmat[targets].reshape(-1, 3, 3)
+        rows = self._first[targets] + elements
+        normals = np.einsum("kij,kj->ki", rotations, self._normals[rows])
+        # a plane touches vertices, which are no element, and its own normal is right
+        normals = np.where(elements[:, None] >= 0, normals, outward)
+        cosines = np.einsum("ij,ij->i", outward, normals)
+        is_behind = self._is_sheet[targets] & (cosines < 0)
+        normals[is_behind] = -normals[is_behind]
+        cosines[is_behind] = -cosines[is_behind]
+        return normals, cosines
 
     def _judge(self, targets: Ints, force: Floats, amount: Floats, friction: Floats) -> None:
         """Warn once for each target whose forces do not come from a contact.
@@ -155,13 +185,14 @@ class FlexContacts:
         Parameters
         ----------
         targets : int64 [p]
-            Of each pair.
+            Target of each pair.
         force, amount : float64 [p]
-            Its force along the mean normal, and the amount of its whole force [N].
+            Force of each pair along the mean normal, and amount of its whole force [N].
         friction : float64 [p]
-            Its greatest coefficient of friction.
+            Greatest coefficient of friction of each pair.
         """
-        across = np.minimum(np.sqrt(np.maximum(amount**2 - force**2, 0.0)), friction * force)
+        across = np.sqrt(np.maximum(amount**2 - force**2, 0.0))
+        across = np.minimum(across, friction * force)
         unexplained = amount - np.where(force > 0, np.hypot(force, across), 0.0)
         self._amounts *= _MEMORY
         np.add.at(self._amounts, targets, np.column_stack([amount, unexplained]))
@@ -198,7 +229,7 @@ def _outward_normals(
         V = in_body @ rotation_in_body(model, geom)
     corners = V[F]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # they point outwards where the volume that they enclose is positive
+    # the normals point outwards where the volume inside the triangles is positive
     outward = np.sign(np.einsum("ij,ij->", normals, corners[:, 0])) if mesh.closed else 1.0
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     return outward * normals / np.maximum(lengths, _MIN_LENGTH)

@@ -1,10 +1,11 @@
 """Contact patches: the points over which the force of each geom on a target is spread.
 
 Contacts mark the corners of a patch. Between two of them a convex geom touches as well, provided
-that the target's surface is there. The force is spread as the midpoint of two contacts drawn at
-random, each with a probability in proportion to its force: force and torque stay the same, and four
-equal corners of a square, or two ends of a line, spread it evenly. The texels round these points
-are a geom's footprint, which is reused while its points stay.
+that the target's surface is there. The force is spread over corners and midpoints as if the place
+were the midpoint of two contacts drawn at random, each with a probability in proportion to its
+force. So force and torque stay the same, and four equal corners of a square, or two ends of a line,
+spread the force evenly. The texels round these points are a geom's footprint, which is reused while
+its points stay.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ MAX_CORNERS = 8
 _INSET = 0.75
 # Points of a patch that is filled are joined where they are nearer than this share of its size.
 _JOINED_SHARE = 1 / 8
-# Between two corners the surface may lie farther off than at the corners, by the footprint radius
+# Between two corners the surface may be farther off than at the corners, by the footprint radius
 # over this, and still be touched.
 _TOUCH_DIVISOR = 10
 # Footprint radius over the patch's size at which the footprints of the points of a square or a line
@@ -47,7 +48,9 @@ def load_points(
     convex: Bools,
     closest: Callable[[Floats], Floats],
 ) -> tuple[Ints, Floats, Floats, Floats]:
-    """Points that carry the forces of all patches on a target, patch by patch, 36 a patch at most.
+    """Points that carry the forces of all patches on a target, patch by patch.
+
+    A patch has 36 points at most: its corners and the midpoints between them.
 
     Parameters
     ----------
@@ -67,7 +70,7 @@ def load_points(
     Returns
     -------
     patches : int64 [n]
-        The patch of each, ascending.
+        The patch of each point, ascending.
     points : float64 [n, 3]
         Near the surface, in the target's frame [m].
     forces : float64 [n]
@@ -80,49 +83,89 @@ def load_points(
     patches = np.zeros(len(forces), dtype=np.int64)
     patches[starts[1:]] = 1
     patches, points, forces = corners(patches.cumsum(), points, forces, radii)
-    # all pairs of corners of a convex patch, [m, 2] in ascending order
-    row = np.arange(len(patches))
-    later = np.where(convex[patches], np.searchsorted(patches, patches, "right") - row - 1, 0)
-    first = np.repeat(row, later)
-    second = first + 1 + np.arange(len(first)) - np.repeat(later.cumsum() - later, later)
-    pairs = np.column_stack([first, second])
-    of_pair = patches[first]
-    if not len(pairs):
+    first, second = _pairs_of_corners(patches, convex)
+    if not len(first):
         return patches, points, forces, radii[patches]
-    probes = np.concatenate([points, (points[first] + points[second]) / 2])
+    pair_patches = patches[first]
+    # corners, then midpoints
+    candidates = np.concatenate([points, (points[first] + points[second]) / 2])
+    candidate_patches = np.concatenate([patches, pair_patches])
     # contact points lie a little outside the surface, by up to their depth: so may the midpoints
-    off = closest(probes) - probes
-    away = np.sqrt(np.einsum("ij,ij->i", off, off))
-    # the forces at the corners are shared among these and the midpoints
-    total = np.bincount(patches, forces)
-    limit = np.zeros(len(radii))
-    np.maximum.at(limit, patches, away[: len(points)])
-    weighted_sums = [np.bincount(patches, forces * coordinate) for coordinate in points.T]
-    middles = np.column_stack(weighted_sums) / total[:, None]
-    size = np.zeros(len(radii))
-    np.maximum.at(size, of_pair, np.sqrt(((points[first] - points[second]) ** 2).sum(axis=1)))
-    # where there is no touch between two corners, they keep their shares
-    touch = away[len(points) :] <= (limit + radii / _TOUCH_DIVISOR)[of_pair]
-    filled = np.zeros(len(radii), np.bool_)
-    filled[of_pair] = True
-    filled[of_pair[~touch]] = False
-    share = forces[first] * forces[second] / total[of_pair]
-    shares = np.concatenate([forces, np.where(touch, 2 * share, 0.0)])
-    shares[pairs] = forces[pairs] ** 2 / total[patches[pairs]]
-    np.add.at(shares, pairs[~touch].ravel(), np.repeat(share[~touch], 2))
-    # what carries a force: of each patch its corners, then the midpoints
-    kept = shares.nonzero()[0]
-    patch_of = np.concatenate([patches, of_pair])
-    kept = kept[patch_of[kept].argsort(kind="stable")]
-    patch_of = patch_of[kept]
+    offsets = closest(candidates) - candidates
+    distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
+    corner_distance = np.zeros(len(radii))  # the greatest of each patch [m]
+    np.maximum.at(corner_distance, patches, distances[: len(points)])
+    touch = distances[len(points) :] <= (corner_distance + radii / _TOUCH_DIVISOR)[pair_patches]
+    total = np.bincount(patches, forces)  # force of each patch [N]
+    shares = _shared_forces(patches, forces, total, np.column_stack([first, second]), touch)
+    # a patch is filled if it has midpoints, and the surface is there at all of them
+    is_filled = np.zeros(len(radii), np.bool_)
+    is_filled[pair_patches] = True
+    is_filled[pair_patches[~touch]] = False
+    size = np.zeros(len(radii))  # of each patch, the longest distance between two corners [m]
+    diagonals = np.sqrt(((points[first] - points[second]) ** 2).sum(axis=1))
+    np.maximum.at(size, pair_patches, diagonals)
+    # the points that carry a force, patch by patch: the corners, then the midpoints
+    rows = shares.nonzero()[0]
+    rows = rows[candidate_patches[rows].argsort(kind="stable")]
+    row_patches = candidate_patches[rows]
     # the points of a patch that is filled stand for the cells of a lattice, and are joined where
     # they are near
-    inset = np.where(filled, _INSET, 1.0)[patch_of, None]
-    near = np.where(filled, size * _JOINED_SHARE, 0.0)
-    lattice = inset * probes[kept] + (1 - inset) * middles[patch_of]
-    patches, points, forces = _joined(patch_of, lattice, shares[kept], near, len(kept))
-    patch_radii = np.where(filled, np.maximum(radii, _OVERLAP * size), radii)
+    weighted_sums = [np.bincount(patches, forces * coordinate) for coordinate in points.T]
+    middles = np.column_stack(weighted_sums) / total[:, None]  # of each patch [m]
+    inset = np.where(is_filled, _INSET, 1.0)[row_patches, None]
+    lattice = inset * candidates[rows] + (1 - inset) * middles[row_patches]
+    joined_within = np.where(is_filled, size * _JOINED_SHARE, 0.0)
+    patches, points, forces = _joined(row_patches, lattice, shares[rows], joined_within, len(rows))
+    patch_radii = np.where(is_filled, np.maximum(radii, _OVERLAP * size), radii)
     return patches, points, forces, patch_radii[patches]
+
+
+def _pairs_of_corners(patches: Ints, convex: Bools) -> tuple[Ints, Ints]:
+    """All pairs of corners of convex patches, in ascending order, [m] and [m].
+
+    Parameters
+    ----------
+    patches : int64 [k]
+        The patch of each corner, ascending.
+    convex : bool [p]
+    """
+    corner = np.arange(len(patches))
+    # how many later corners the patch of a corner has
+    patch_ends = np.searchsorted(patches, patches, "right")
+    later_corners = np.where(convex[patches], patch_ends - corner - 1, 0)
+    first = np.repeat(corner, later_corners)
+    first_pairs = np.repeat(later_corners.cumsum() - later_corners, later_corners)
+    second = first + 1 + np.arange(len(first)) - first_pairs
+    return first, second
+
+
+def _shared_forces(
+    patches: Ints, forces: Floats, total: Floats, pairs: Ints, touch: Bools
+) -> Floats:
+    """Forces of the corners, shared among corners and midpoints [N], [k + m].
+
+    Where there is no touch between two corners, they keep the share of their midpoint.
+
+    Parameters
+    ----------
+    patches : int64 [k]
+        The patch of each corner, ascending.
+    forces : float64 [k]
+        Of the corners [N].
+    total : float64 [p]
+        Force of each patch [N].
+    pairs : int64 [m, 2]
+        The two corners of each midpoint.
+    touch : bool [m]
+        Whether the surface is at the midpoint.
+    """
+    first, second = pairs.T
+    half_share = forces[first] * forces[second] / total[patches[first]]
+    shares = np.concatenate([forces, np.where(touch, 2 * half_share, 0.0)])
+    shares[pairs] = forces[pairs] ** 2 / total[patches[pairs]]
+    np.add.at(shares, pairs[~touch].ravel(), np.repeat(half_share[~touch], 2))
+    return shares
 
 
 def corners(
@@ -130,8 +173,8 @@ def corners(
 ) -> tuple[Ints, Floats, Floats]:
     """Join contacts within a radius of the strongest contact of their patch.
 
-    Contacts farther apart (the two ends of a capsule) stay apart, up to eight corners; then the
-    rest joins the nearest. The forces of the corners add up to those of the patch.
+    Contacts farther apart (the two ends of a capsule) stay apart, up to eight corners; all further
+    contacts join the nearest corner. The forces of the corners add up to those of the patch.
 
     Parameters
     ----------
@@ -158,7 +201,7 @@ def corners(
 
 
 def _joined(
-    patches: Ints, points: Floats, forces: Floats, near: Floats, most: int
+    patches: Ints, points: Floats, forces: Floats, within: Floats, max_seeds: int
 ) -> tuple[Ints, Floats, Floats]:
     """Join the points of each patch with the first seed near them; see `corners` for the result.
 
@@ -168,10 +211,10 @@ def _joined(
     ----------
     patches, points, forces
         See `corners`.
-    near : float64 [p]
+    within : float64 [p]
         Distance within which the points of a patch are joined [m].
-    most : int
-        Of the seeds of a patch; further points join the nearest seed.
+    max_seeds : int
+        Largest number of seeds of a patch; further points join the nearest seed.
     """
     # allocated here: kernels that allocate take longer to compile
     seeds = _Seeds(
@@ -180,12 +223,12 @@ def _joined(
         points=np.empty_like(points),
         forces=np.empty_like(forces),
     )
-    count = _join(patches, points, forces, near, most, seeds)
+    count = _join(patches, points, forces, within, max_seeds, seeds)
     return seeds.patches[:count], seeds.points[:count], seeds.forces[:count]
 
 
 class _Seeds(NamedTuple):
-    """Points with which others are joined, patch by patch.
+    """Points with which other points are joined, patch by patch.
 
     Attributes
     ----------
@@ -206,7 +249,7 @@ class _Seeds(NamedTuple):
 
 @kernel
 def _join(
-    patches: Ints, points: Floats, forces: Floats, near: Floats, most: int, seeds: _Seeds
+    patches: Ints, points: Floats, forces: Floats, within: Floats, max_seeds: int, seeds: _Seeds
 ) -> int:
     """Fill in the seeds; return their number."""
     count = 0
@@ -224,9 +267,9 @@ def _join(
             if distance2 < least:
                 nearest = row
                 least = distance2
-            if joins < 0 and distance2 <= near[patches[i]] ** 2:
+            if joins < 0 and distance2 <= within[patches[i]] ** 2:
                 joins = row
-        if joins < 0 and count - begin == most:
+        if joins < 0 and count - begin == max_seeds:
             joins = nearest
         if joins < 0:
             seeds.rows[count] = i
@@ -243,8 +286,8 @@ def _join(
     return count
 
 
-class _Made(NamedTuple):
-    """Footprints that exist, as they were asked for.
+class _Keys(NamedTuple):
+    """The load points for which footprints were made, one for each footprint.
 
     Attributes
     ----------
@@ -254,7 +297,7 @@ class _Made(NamedTuple):
     radii : float64 [m]
         [m].
     tolerances : float64 [m]
-        How far point and radius may move before another footprint is made [m].
+        How far point and radius may change before another footprint is made [m].
     """
 
     geoms: Ints
@@ -277,24 +320,25 @@ class Footprints:
     def __init__(self, atlas: Atlas, movable: NDArray[np.bool_]) -> None:
         self._movable = movable
         self._place_on(atlas)
-        self._made = _Made(
+        self._keys = _Keys(
             geoms=np.zeros(0, np.int64),
             points=np.zeros((0, 3)),
             radii=np.zeros(0),
             tolerances=np.zeros(0),
         )
-        # texels and shares of each, as `under` gives them
-        self._under: list[tuple[Ints, Floats]] = []
+        # texels and shares of each footprint
+        self._footprints: list[tuple[Ints, Floats]] = []
 
     def follow(self, atlas: Atlas) -> None:
-        """Go on where the surface is now: footprints ride on their texels."""
-        first = [texels[0] for texels, _ in self._under]
-        before = self._grid.positions
+        """Go on with the surface as it is now: footprints ride on their texels."""
+        first_texels = [texels[0] for texels, _ in self._footprints]
+        positions_before = self._grid.positions[first_texels]
         self._place_on(atlas)
-        points = self._made.points + self._grid.positions[first] - before[first]
-        self._made = self._made._replace(points=points)
+        points = self._keys.points + self._grid.positions[first_texels] - positions_before
+        self._keys = self._keys._replace(points=points)
 
     def _place_on(self, atlas: Atlas) -> None:
+        """Take the geometry of an atlas."""
         self._atlas = atlas
         self._grid = atlas.texels.grid
         self._movable_area = self._grid.areas * self._movable
@@ -318,30 +362,32 @@ class Footprints:
             Geoms that touch, have lost touch only now, or have yet to give an impulse: their
             footprints are kept.
         """
-        rows = np.full(len(geoms) + len(self._under), -1)
+        rows = np.full(len(geoms) + len(self._footprints), -1)
         touching = np.zeros(len(active), np.bool_)
-        rows = rows[: _serving(geoms, points, radii, self._made, active, touching, rows)]
+        count = _serving(geoms, points, radii, self._keys, active, touching, rows)
+        rows = rows[:count]
         new = (rows < 0).nonzero()[0]
-        rows[new] = len(self._under) + np.arange(len(new))
-        under = self._under
+        rows[new] = len(self._footprints) + np.arange(len(new))
+        footprints = self._footprints
         tolerances = np.zeros(0)
         if len(new):
             grid = self._grid
             places, centres = self._atlas.nearest_places(points[new])
             begins, texels, weights, _ = weigh_each(grid, centres, places, radii[new])
             shares = weights * self._movable_area[texels]
-            ends = itertools.pairwise(begins.tolist())
-            under = [*under, *((texels[first:last], shares[first:last]) for first, last in ends)]
+            footprints = list(footprints)
+            for first, last in itertools.pairwise(begins.tolist()):
+                footprints.append((texels[first:last], shares[first:last]))
             tolerances = SAME_PLACE * np.sqrt(grid.areas[centres])
-        self._under = [under[row] for row in rows.tolist()]
-        made = self._made
-        self._made = _Made(
-            geoms=np.concatenate([made.geoms, geoms[new]])[rows],
-            points=np.concatenate([made.points, points[new]])[rows],
-            radii=np.concatenate([made.radii, radii[new]])[rows],
-            tolerances=np.concatenate([made.tolerances, tolerances])[rows],
+        self._footprints = [footprints[row] for row in rows.tolist()]
+        keys = self._keys
+        self._keys = _Keys(
+            geoms=np.concatenate([keys.geoms, geoms[new]])[rows],
+            points=np.concatenate([keys.points, points[new]])[rows],
+            radii=np.concatenate([keys.radii, radii[new]])[rows],
+            tolerances=np.concatenate([keys.tolerances, tolerances])[rows],
         )
-        return self._under[: len(geoms)]
+        return self._footprints[: len(geoms)]
 
 
 @kernel
@@ -349,12 +395,12 @@ def _serving(
     geoms: Ints,
     points: Floats,
     radii: Floats,
-    made: _Made,
+    keys: _Keys,
     active: Bools,
     touching: Bools,
     rows: Ints,
 ) -> int:
-    """Fill in the first footprint that serves each load point, then the footprints that are kept.
+    """Find the row of the first footprint that serves each load point, and of those that are kept.
 
     Returns the number of load points and kept footprints.
 
@@ -362,29 +408,30 @@ def _serving(
     ----------
     geoms, points, radii
         Of the load points.
-    made : _Made
-        The footprints.
+    keys : _Keys
+        Of the footprints.
     active
         Geoms whose footprints are kept.
     touching : bool [c]
         Scratch, False.
     rows : int64 [n + m]
-        -1, which stays where none serves.
+        Filled in: a row for each load point, then one for each footprint that is kept. It is -1
+        before, which stays where no footprint serves.
     """
     count = len(geoms)
     for i in range(len(geoms)):
         touching[geoms[i]] = True
-        for row in range(len(made.geoms)):
-            if made.geoms[row] == geoms[i] and rows[i] < 0:
+        for row in range(len(keys.geoms)):
+            if keys.geoms[row] == geoms[i] and rows[i] < 0:
                 distance2 = 0.0
                 for k in range(3):
-                    distance2 += (made.points[row, k] - points[i, k]) ** 2
-                tolerance = made.tolerances[row]
-                same_radius = abs(made.radii[row] - radii[i]) <= tolerance
+                    distance2 += (keys.points[row, k] - points[i, k]) ** 2
+                tolerance = keys.tolerances[row]
+                same_radius = abs(keys.radii[row] - radii[i]) <= tolerance
                 if np.sqrt(distance2) <= tolerance and same_radius:
                     rows[i] = row
-    for row in range(len(made.geoms)):
-        geom = made.geoms[row]
+    for row in range(len(keys.geoms)):
+        geom = keys.geoms[row]
         if active[geom] and not touching[geom]:
             rows[count] = row
             count += 1

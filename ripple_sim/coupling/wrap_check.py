@@ -13,25 +13,28 @@ from ripple_sim.solver.kernel import Floats
 from .ids import TargetId
 from .model import CoupledModel
 
-# A flex is wrapped round something where the amounts of the forces on it are more than this many
-# times their sum as vectors.
+# A flex wraps round something if the amounts of the forces on it are more than this many times
+# their sum as vectors.
 _MAX_AMOUNT_OVER_SUM = 1.1
-# Steps of touch after which it is judged.
+# Number of steps of touch after which a flex is judged.
 _MIN_STEPS = 50
 
 
 class WrapCheck:
-    """Warns of flexes that wrap round something. Called with the `Contacts` of each step by target.
+    """Warns of flexes that wrap round something.
 
-    Round a ball the forces on a cloth's slopes point against one another: the amounts of the forces
-    press the surface, as a string round a pole does, and the sum of the forces moves the ball.
+    Call it with the `Contacts` of each step, by target.
+
+    If a cloth wraps round a ball, the forces on its slopes point against one another. The amounts
+    of the forces press the cloth, but only their vector sum moves the ball.
     """
 
     def __init__(self, coupled: CoupledModel) -> None:
         self._names = coupled.names
         self._owners = coupled.owners
         self._flexes = {target for target, surface in coupled.soft.items() if surface.flex >= 0}
-        # by target and what touches it: steps, and sums of amounts and of vector sums [N]
+        # by target and owner of the colliders that touch it: number of steps, and over these steps
+        # the sums of the amounts and of the vector sums of forces [N]
         self._sums: dict[tuple[TargetId, int], Floats] = {}
 
     def __call__(self, contacts: Mapping[TargetId, Any]) -> None:
@@ -40,11 +43,11 @@ class WrapCheck:
             others, _, forces, normals = contacts[target]
             owners = self._owners[others]
             for owner in np.unique(owners).tolist():
-                mine = owners == owner
-                amount = forces[mine].sum()
-                together = np.linalg.norm(forces[mine] @ normals[mine])
+                is_owned = owners == owner
+                amount = forces[is_owned].sum()
+                vector_sum = np.linalg.norm(forces[is_owned] @ normals[is_owned])
                 sums = self._sums.setdefault((target, owner), np.zeros(3))
-                sums += np.array([1.0, amount, together])
+                sums += np.array([1.0, amount, vector_sum])
                 steps, pressing, moving = sums
                 if steps >= _MIN_STEPS and pressing > _MAX_AMOUNT_OVER_SUM * moving:
                     self._flexes.discard(target)
