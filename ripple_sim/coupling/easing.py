@@ -1,8 +1,8 @@
-"""Easing: a surface that shows the lightest body bears far heavier ones.
+"""Easing: a surface on which the lightest body makes visible waves bears far heavier bodies.
 
-A robot's torso can be hit by a ball and bear the whole robot, whose impulses differ by a factor of
-a thousand. Waves are proportional to impulses, so that no density shows the ball and bears the
-robot. Where the user gives no density, the model chooses one that shows the lightest body, and
+A robot's torso is hit by a ball, and bears the whole robot: their impulses differ by a factor of a
+thousand. Waves are proportional to impulses, so that no density shows the ball and bears the robot.
+Where the user gives no density, the model chooses one that shows the lightest body, and
 `Easing` limits the forces of the heavier bodies.
 """
 
@@ -61,12 +61,19 @@ class EasingLaw(NamedTuple):
     ) -> EasingLaw:
         """The law that limits dents to a share of half the surface's thickness.
 
-        A hit J that is short beside the surface's swing of rate w counts as a force J w. Arguments
-        are as for `density_under`.
+        An impulse J that is short beside the surface's swing of rate w counts as a force J w. The
+        arguments are as for `density_under`.
         """
-        unit = depth_under(1.0, radius=radius, density=density, speed=speed, stiffness=stiffness)
+        depth_per_force = depth_under(  # [m/N]
+            1.0, radius=radius, density=density, speed=speed, stiffness=stiffness
+        )
         rate = math.sqrt(stiffness)
-        return cls(share * thickness / unit, rate, thickness, speed / rate)
+        return cls(
+            most=share * thickness / depth_per_force,
+            rate=rate,
+            thickness=thickness,
+            reach=speed / rate,
+        )
 
 
 class Easing:
@@ -114,13 +121,13 @@ class Easing:
         for texel in texels.tolist():
             if texel not in self._thinness:
                 position = self._texel_tree.data[texel]
-                near = self._texel_tree.query_ball_point(position, self._law.reach)
-                thinnest = float(self._half_thickness[near].min())
+                texels_in_reach = self._texel_tree.query_ball_point(position, self._law.reach)
+                thinnest = float(self._half_thickness[texels_in_reach].min())
                 self._thinness[texel] = min(thinnest / self._law.thickness, 1.0)
         return np.array([self._thinness[texel] for texel in texels.tolist()])
 
     def shares(self, colliders: Ints, texels: Ints, forces: Floats, elapsed: float) -> Floats:
-        """Share of each collider's force that is taken up, [k].
+        """Share of each collider's force that the surface takes up, [k].
 
         Parameters
         ----------
@@ -134,13 +141,15 @@ class Easing:
             How long the forces are held [s].
         """
         bodies = self._bodies[colliders]
-        total = np.bincount(bodies, np.abs(forces), len(self._smoothed))
+        # by body [N]
+        body_forces = np.bincount(bodies, np.abs(forces), len(self._smoothed))
         fading = math.exp(-self._law.rate * elapsed)
         remaining = self._smoothed * fading
-        added = total * (1 - fading)
-        thinnest = np.ones_like(total)
-        np.minimum.at(thinnest, bodies, self._thinness_at(texels))
-        room = np.maximum(self._law.most * thinnest - remaining, 0.0)
+        added = body_forces * (1 - fading)
+        thinness = np.ones_like(body_forces)
+        np.minimum.at(thinness, bodies, self._thinness_at(texels))
+        # how much of `added` is taken up
+        room = np.maximum(self._law.most * thinness - remaining, 0.0)
         share = np.divide(room, added, out=np.ones_like(added), where=added > room)
         self._smoothed = remaining + share * added
         self.least_share = min(self.least_share, float(share[bodies].min(initial=1.0)))
@@ -165,7 +174,7 @@ def bodies_of(coupled: CoupledModel) -> NDArray[np.int64]:
 
 
 def easing_warning(name: str, easing: Easing) -> str | None:
-    """The warning about targets whose forces are eased, or None."""
+    """The warning about a target whose forces are eased; None if they are taken up nearly whole."""
     if easing.least_share >= _WARNED_SHARE:
         return None
     return (

@@ -3,8 +3,8 @@
 Surfaces give way in the contact problem: each row of MuJoCo's constraint solver gets the gap, the
 velocity and the mobility of the surfaces that it presses on. A pair pays in the energy that its
 contacts take from the motion of body and surface, and gets back no more than it has paid in. Forces
-that would take more are lessened (a passivity observer and controller: Hannaford and Ryu, 2002).
-`VelocityChange` says how new forces change the velocities, by MuJoCo's own integrators.
+that would take more are reduced (a passivity observer and controller: Hannaford and Ryu, 2002).
+`VelocityChange` computes how new forces change the velocities, by MuJoCo's own integrators.
 """
 
 from __future__ import annotations
@@ -34,14 +34,15 @@ _MIN_WIDTH = 1e-15
 
 # Rounds in which contacts that share a footprint find their forces.
 _SHARING_ROUNDS = 8
-# The rounds end where the velocities that the forces give differ by less than this share.
+# The rounds end if the accelerations that the forces give differ by less than this share.
 _SHARING_TOLERANCE = 1e-4
 
-# Attempts to lessen the forces of pairs that cannot afford them.
+# Attempts to reduce the forces of pairs that cannot afford them.
 _AFFORDING_ATTEMPTS = 6
 # From the second attempt on a pair gets this part of the share that it can afford.
 _CAUTION = 0.95
-# The least share of a force; in the last two attempts all pairs without cover get this share.
+# The least share of a force. In the last two attempts all pairs that cannot afford their forces get
+# this share.
 _MIN_SHARE = 1e-9
 
 # A difference of two works below this share of the work is round-off.
@@ -155,6 +156,7 @@ class VelocityChange:
         scratch = self._scratch
 
         def end(start: Floats, acceleration: Floats, forces: Floats) -> Floats:
+            """Velocities at the end of a step from those at its start."""
             mujoco.mj_copyData(scratch, self._model, data)
             scratch.qvel[:] = start
             scratch.qacc[:] = acceleration
@@ -168,13 +170,13 @@ class VelocityChange:
             start = self.latest
         else:
             start = data.qvel - dt * qacc
-        old = end(start, qacc, force)
+        old_end = end(start, qacc, force)
         for _ in range(0 if pending else _START_ROUNDS):
-            if np.array_equal(old, data.qvel):
+            if np.array_equal(old_end, data.qvel):
                 break
-            start = start + data.qvel - old
-            old = end(start, qacc, force)
-        return end(start, data.qacc, data.qfrc_constraint) - old
+            start = start + data.qvel - old_end
+            old_end = end(start, qacc, force)
+        return end(start, data.qacc, data.qfrc_constraint) - old_end
 
 
 class Pair(NamedTuple):
@@ -186,15 +188,15 @@ class Pair(NamedTuple):
         Target and other.
     height : float
         Of the surface [m].
-    held : float
+    held_force : float
         Force of the last step [N].
-    start : float
+    start_velocity : float
         Velocity of the surface at the beginning of the step [m/s].
-    free : float
+    end_velocity : float
         Velocity at the end of the step under the force of the last step [m/s].
     mobility : float
         Change of the velocity at the end by a unit force, over the step [1/kg].
-    mean : float
+    mean_velocity : float
         Mean velocity over the step under the force of the last step [m/s].
     mean_mobility : float
         Change of the mean velocity by a unit force, over the step [1/kg].
@@ -202,11 +204,11 @@ class Pair(NamedTuple):
 
     key: Key
     height: float
-    held: float
-    start: float
-    free: float
+    held_force: float
+    start_velocity: float
+    end_velocity: float
     mobility: float
-    mean: float
+    mean_velocity: float
     mean_mobility: float
 
     @property
@@ -308,8 +310,8 @@ class ContactProblem:
         # mobility of each row [1/kg] if all rows of its pairs bear the same force
         self._mobility = np.zeros(data.nefc)
         self._dual = DualDiagonal(model, data)
-        # acceleration without contacts [m/s^2]
-        self._smooth = self._along(data.qacc_smooth)
+        # acceleration of the rows without contacts [m/s^2]
+        self._smooth = self._in_rows(data.qacc_smooth)
         row_count = dict.fromkeys(self._pairs, 0)
         for rows in self._contacts:
             for pair in rows.pairs:
@@ -339,17 +341,18 @@ class ContactProblem:
         first = rows.normal.start
         gap = data.efc_pos[first] - data.efc_margin[first] - sum(pair.height for pair in pairs)
         stiffness, damping = data.efc_KBIP[first, :2]
-        part = impedance(data.contact.solimp[rows.contact], gap)
-        self._R[rows.all] *= data.efc_diagA[first] * (1 - part) / part / self._R[first]
+        d = impedance(data.contact.solimp[rows.contact], gap)
+        self._R[rows.all] *= data.efc_diagA[first] * (1 - d) / d / self._R[first]
         if gap >= 0:
             self._aref[rows.normal] = _OPEN_ACCELERATION
             return
         # acceleration of the surface without a force [m/s^2]
         free = sum(
-            (pair.free - pair.start) / self._dt + pair.mobility * pair.held for pair in pairs
+            (pair.end_velocity - pair.start_velocity) / self._dt + pair.mobility * pair.held_force
+            for pair in pairs
         )
-        slip = data.efc_vel[rows.normal] - sum(pair.start for pair in pairs)
-        self._aref[rows.normal] = free - damping * slip - stiffness * part * gap
+        slip = data.efc_vel[rows.normal] - sum(pair.start_velocity for pair in pairs)
+        self._aref[rows.normal] = free - damping * slip - stiffness * d * gap
 
     def solve(self, paid: Mapping[Purse, float]) -> dict[Key, float]:
         """Force on each target in a pair [N], which every pair can afford.
@@ -369,33 +372,51 @@ class ContactProblem:
             shares = self._affordable(force, paid)
             if not shares:
                 break
-            gained = self._along(data.qacc) - self._smooth
-            total = self._total(force)
-            for rows in self._contacts:
-                share = shares.get(rows.pairs[0].purse)
-                if share is None:
-                    continue
-                share = max(share * (_CAUTION if attempt else 1), _MIN_SHARE)
+            for purse, share in shares.items():
                 if attempt >= _AFFORDING_ATTEMPTS - 2:
-                    share = _MIN_SHARE
-                normal = rows.normal
-                yields = sum(pair.mobility * total[pair.key] for pair in rows.pairs)
-                divisor = np.where(force[normal] > 0, force[normal], np.inf)
-                mobility = np.maximum(gained[normal] + yields, 0) / divisor
-                # with this added to R, and other rows unchanged, a row carries its share
-                less = (1 - share) / share
-                softness[normal] += less * (self._R[normal] + softness[normal] + mobility)
+                    share = 0.0
+                elif attempt:
+                    share = share * _CAUTION
+                shares[purse] = max(share, _MIN_SHARE)
+            self._soften(softness, force, shares)
         return self._total(force)
+
+    def _soften(self, softness: Floats, force: Floats, shares: Mapping[Purse, float]) -> None:
+        """Add to the softness of rows so that they carry shares of their forces.
+
+        Parameters
+        ----------
+        softness : float64 [nefc]
+            Updated [1/kg].
+        force : float64 [nefc]
+            Forces of all rows with the present softness [N].
+        shares : mapping
+            Share of its forces that an account gets; the forces of the others stay.
+        """
+        by_forces = self._in_rows(self._data.qacc) - self._smooth  # [m/s^2]
+        total = self._total(force)
+        for rows in self._contacts:
+            share = shares.get(rows.pairs[0].purse)
+            if share is None:
+                continue
+            normal = rows.normal
+            by_surfaces = sum(pair.mobility * total[pair.key] for pair in rows.pairs)
+            divisor = np.where(force[normal] > 0, force[normal], np.inf)
+            mobility = np.maximum(by_forces[normal] + by_surfaces, 0) / divisor
+            # with this added to R, and other rows unchanged, a row carries its share
+            factor = (1 - share) / share
+            softness[normal] += factor * (self._R[normal] + softness[normal] + mobility)
 
     def works(self) -> list[Work]:
         """The work of each pair, with the forces that were found."""
         force = self._data.efc_force
         work = defaultdict[Key, float](float)
-        mean_velocity = self._data.efc_vel + self._dt / 2 * self._along(self._data.qacc)
+        mean_velocity = self._data.efc_vel + self._dt / 2 * self._in_rows(self._data.qacc)
         for rows, normal in zip(self._contacts, self._normal(force), strict=True):
-            along = normal * self._dt * float(mean_velocity[rows.normal].mean())
-            aside = self._dt * float(force[rows.all] @ mean_velocity[rows.all]) - along
-            work[rows.pairs[0].key] += along + max(aside, 0.0)
+            normal_work = normal * self._dt * float(mean_velocity[rows.normal].mean())
+            total_work = self._dt * float(force[rows.all] @ mean_velocity[rows.all])
+            friction_work = total_work - normal_work
+            work[rows.pairs[0].key] += normal_work + max(friction_work, 0.0)
         total = self._total(force)
         return [Work(pair, work[key], total[key]) for key, pair in self._pairs.items()]
 
@@ -413,8 +434,8 @@ class ContactProblem:
                 total[pair.key] += normal
         return total
 
-    def _along(self, vector: Floats) -> Floats:
-        """Rows of the constraint Jacobian times a vector over the degrees of freedom."""
+    def _in_rows(self, vector: Floats) -> Floats:
+        """The motion of all rows, [nefc], from that of the degrees of freedom, [nv]."""
         product = np.zeros(self._data.nefc)
         mujoco.mj_mulJacVec(self._model, self._data, product, vector)
         return product
@@ -451,20 +472,22 @@ class ContactProblem:
                 aref[rows.normal] -= sum(pair.mobility * total[pair.key] for pair in rows.pairs)
             data.efc_aref[:] = aref
             mujoco.mj_fwdConstraint(self._model, data)
-            last = force
+            force_before = force
             force = data.efc_force.copy()
-            if self._agree(force, last, total):
+            if self._agree(force, force_before, total):
                 break
         return force
 
-    def _agree(self, force: Floats, last: Floats, last_total: Mapping[Key, float]) -> bool:
+    def _agree(
+        self, force: Floats, force_before: Floats, total_before: Mapping[Key, float]
+    ) -> bool:
         """Whether rows move the surfaces as the sums of their forces do, after a round.
 
         Parameters
         ----------
-        force, last : float64 [nefc]
+        force, force_before : float64 [nefc]
             Forces of all rows after the round, and before it [N].
-        last_total : mapping
+        total_before : mapping
             Force on each target in a pair before the round [N].
         """
         total = self._total(force)
@@ -473,9 +496,9 @@ class ContactProblem:
         greatest_difference = 0.0
         for rows in self._contacts:
             normal = rows.normal
-            by_rows = self._mobility[normal] * (force[normal] - last[normal])
+            by_rows = self._mobility[normal] * (force[normal] - force_before[normal])
             for pair in rows.pairs:
-                by_pair = pair.mobility * (total[pair.key] - last_total[pair.key])
+                by_pair = pair.mobility * (total[pair.key] - total_before[pair.key])
                 difference = float(np.abs(by_rows - by_pair).max())
                 greatest_difference = max(greatest_difference, difference)
                 greatest = max(greatest, pair.mobility * abs(total[pair.key]))
@@ -493,27 +516,28 @@ class ContactProblem:
         linear = defaultdict[Purse, float](float)
         square = defaultdict[Purse, float](float)
         for pair in self._pairs.values():
-            on_pair = total[pair.key]
-            added = pair.mean_mobility * dt
-            linear[pair.purse] += -on_pair * dt * (pair.mean + added * pair.held)
-            square[pair.purse] += on_pair * dt * added * on_pair
+            pair_force = total[pair.key]
+            velocity_per_force = pair.mean_mobility * dt  # [m/s/N]
+            mean_velocity = pair.mean_velocity + velocity_per_force * pair.held_force
+            linear[pair.purse] += -pair_force * dt * mean_velocity
+            square[pair.purse] += pair_force * dt * velocity_per_force * pair_force
         # mean velocity of the bodies without the forces, and by the forces [m/s]
         motions = (
             data.efc_vel + dt / 2 * self._smooth,
-            dt / 2 * (self._along(data.qacc) - self._smooth),
+            dt / 2 * (self._in_rows(data.qacc) - self._smooth),
         )
         for rows, normal in zip(self._contacts, self._normal(force), strict=True):
             row_forces = force[rows.all]
             # works of the normal force and of all rows, in both motions [J]
-            along = np.zeros(2)
-            whole = np.zeros(2)
+            normal_works = np.zeros(2)
+            all_works = np.zeros(2)
             for i, velocity in enumerate(motions):
-                along[i] = normal * dt * float(velocity[rows.normal].mean())
-                whole[i] = dt * float(row_forces @ velocity[rows.all])
-            aside = whole - along
-            works = along
-            if aside.sum() > 0:
-                works = along + aside  # friction that drives must be paid for too
+                normal_works[i] = normal * dt * float(velocity[rows.normal].mean())
+                all_works[i] = dt * float(row_forces @ velocity[rows.all])
+            friction_works = all_works - normal_works
+            works = normal_works
+            if friction_works.sum() > 0:
+                works = normal_works + friction_works  # friction that drives must be paid for too
             purse = rows.pairs[0].purse
             linear[purse] += float(works[0])
             square[purse] += float(works[1])
@@ -533,15 +557,20 @@ def affordable_share(linear: float, square: float, paid: float) -> float:
     return max(float(root - linear) / (2 * square), 0.0)
 
 
+def _as_impedance(value: float) -> float:
+    """A value as near as MuJoCo lets an impedance come to 0 and 1."""
+    return min(max(value, _MIN_IMPEDANCE), 1 - _MIN_IMPEDANCE)
+
+
 def impedance(solimp: Iterable[float], gap: float) -> float:
     """MuJoCo's impedance d of a contact, from its `solimp` [5] and its gap [m].
 
     See "Solver parameters" in MuJoCo's manual.
     """
     begin, end, width, middle, power = (float(value) for value in solimp)
-    begin, end, middle = (
-        min(max(value, _MIN_IMPEDANCE), 1 - _MIN_IMPEDANCE) for value in (begin, end, middle)
-    )
+    begin = _as_impedance(begin)
+    end = _as_impedance(end)
+    middle = _as_impedance(middle)
     if begin == end or width <= _MIN_WIDTH:
         return (begin + end) / 2
     along = min(abs(gap) / width, 1.0)

@@ -34,9 +34,9 @@ from .target import Target
 
 PULSES = ("contact", "hertz")
 
-# A body is put down, and does not hit, where it gains its speed within this time as it falls [s].
+# A body that gains its speed within this time as it falls is put down, and does not hit [s].
 _PUT_DOWN_TIME = 0.005
-# Steps of MuJoCo's contact in which it is looked for when the bodies part.
+# Largest number of steps of MuJoCo's contact within which the bodies part.
 _MAX_CONTACT_STEPS = 1000
 # Product over squared sum of the principal curvatures of a gap that counts as round: 1/4 for a
 # ball, 0.08 where one is ten times the other. Hertz's time is off by 4 % there if both count by
@@ -44,11 +44,11 @@ _MAX_CONTACT_STEPS = 1000
 _MIN_ROUNDNESS = 0.08
 # Cosine between a normal and the axis of a capsule or a cylinder, up to which its side touches.
 _MAX_SIDE_COSINE = 0.02
-# Length of the mean of the normals under a footprint, below which it lies over an edge.
+# Length of the mean of the normals under a footprint below which the footprint lies over an edge.
 _MIN_MEAN_NORMAL = 0.9
-# A pulse is given in so many parts, or as many as it has substeps.
+# A pulse is divided into so many parts, or into as many as it has substeps.
 _PARTS_PER_PULSE = 32
-# From this share of its time on, a pulse is over: a bound for round-off.
+# From this share of its time on a pulse is over; the rest is round-off.
 _OVER = 1 - 1e-9
 # Singular values of a footprint's extent below this share of the greatest are 0: the footprint has
 # no extent along its normal.
@@ -141,7 +141,11 @@ class PulsedLoad(NamedTuple):
     pulses: tuple[Pulse, ...]
 
     def parts(self, dt: float, substeps: int) -> Iterator[tuple[int, Load]]:
-        """Substeps, or 32nds of the shortest pulse; at last the constant load alone."""
+        """Load by load, with the number of substeps for which each acts.
+
+        A part is a substep, or a 32nd of the shortest pulse if that is longer. At last comes the
+        constant load alone.
+        """
         substep = dt / substeps
         shortest = min(pulse.duration for pulse in self.pulses)
         remaining = max(pulse.duration - pulse.age for pulse in self.pulses)
@@ -180,17 +184,18 @@ class Hit(NamedTuple):
 def foreseen(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Hit | None:
     """The hit of a pair whose contacts begin in this step, by their indices among MuJoCo's, [k].
 
-    None where nothing pushes, or not against a mass, or a body is put down. The mass is the
+    None if nothing pushes, if there is no mass to push, or if a body is put down. The mass is the
     contacts' force over the acceleration that all constraints give the pair: where a body hits at
-    several places at once, each has its share. The impulse is the one that turns the bodies round
-    as MuJoCo's contact does in its steps, without the forces that pull the two together.
+    several places at once, each place has its share. The impulse turns the bodies round as MuJoCo's
+    contact does in its steps, without the forces that pull the two together.
     """
     rows, contact_of_row = normal_rows(model, data, contacts)
     row_forces = data.efc_force[rows]
     force = float(row_forces.sum())
     if not force > 0:
         return None
-    # what is across the normal cancels in a mean over the edges of a pyramid, whatever their forces
+    # in a mean over the edges of a pyramid the motion across the normal cancels, whatever their
+    # forces
     edge_means = np.bincount(contact_of_row, row_forces) / np.bincount(contact_of_row)
     shares = edge_means[contact_of_row] / force
     accelerations = np.zeros((2, data.nefc))
@@ -367,12 +372,12 @@ class Hits:
     def _contacts_with(self, data: mujoco.MjData, other: ColliderId) -> Ints:
         """MuJoCo's contacts of a collider with the target that carry a force, [k]."""
         colliders = collider_ids(self._coupled, data)
-        own: list[ColliderId] = [self._target]
+        solids: list[ColliderId] = [self._target]
         if is_geom(self._target, self._coupled.model):
-            own += self._coupled.collision_geoms(self._target)
-        ours = np.isin(colliders, own)
-        of_pair = (ours[:, ::-1] & (colliders == other)).any(axis=1)
-        return (of_pair & (data.contact.efc_address >= 0)).nonzero()[0]
+            solids += self._coupled.collision_geoms(self._target)
+        is_solid = np.isin(colliders, solids)
+        is_of_pair = (is_solid[:, ::-1] & (colliders == other)).any(axis=1)
+        return (is_of_pair & (data.contact.efc_address >= 0)).nonzero()[0]
 
     def _warn(self, other: ColliderId, reason: str) -> None:
         """Warn once that hits keep MuJoCo's pulse for this reason."""

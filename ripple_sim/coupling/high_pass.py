@@ -1,4 +1,4 @@
-"""`HighPass` leaves a flex its coarse motion: its waves get what the flex cannot follow."""
+"""`HighPass` leaves a flex its coarse motion: the waves get the rest, which it cannot follow."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ADDED_MASS = 1e-9
 
 
 class HighPass:
-    """Takes the part out of a load that would move the surface as its flex moves by itself.
+    """Takes out of a load the part that would move the surface as its flex moves by itself.
 
     The forces that remain do no work on any coarse velocity: M B u is taken off, with M the
     texels' masses, the columns of B the coarse motions along the normals, and B' M B u = B' f.
@@ -60,9 +60,9 @@ def _times(
 def coarse_motions(waves: WaveSolver, surface: SoftSurface) -> csr_array | NDArray[np.float64]:
     """Motions of the texels along their normals that a flex makes itself, [T, k].
 
-    Of a flex with its own vertices as degrees of freedom: each of these moves along the normal, and
-    heights between them are linear. Of one that is interpolated between 8 or 27 nodes: all
-    polynomials of that degree along each axis.
+    If the degrees of freedom of a flex are its vertices, there is a motion for each vertex along
+    the normal, and heights between vertices are linear. If the flex is interpolated between 8 or 27
+    nodes, the motions are all polynomials of that degree along each axis.
     """
     atlas = waves.rest
     texels = np.arange(atlas.areas.size)
@@ -74,5 +74,6 @@ def coarse_motions(waves: WaveSolver, surface: SoftSurface) -> csr_array | NDArr
     x = 2 * (x - x.min(axis=0)) / np.ptp(x, axis=0) - 1
     powers = np.stack(np.meshgrid(*[np.arange(surface.degree + 1)] * 3), axis=-1).reshape(-1, 3)
     functions = np.prod(x[:, None] ** powers, axis=2)
-    # motion by motion in memory: products with vectors are then sums along it
-    return np.concatenate([functions.T * n for n in atlas.normals.reshape(-1, 3).T]).T
+    # each motion is contiguous in memory: products with vectors are then sums along it
+    normals = atlas.normals.reshape(-1, 3)
+    return np.concatenate([functions.T * component for component in normals.T]).T

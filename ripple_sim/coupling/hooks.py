@@ -44,7 +44,7 @@ _followers: dict[int, list[Callable[[], None]]] = {}
 _mujoco_functions: dict[str, Callable[..., None]] = {}
 
 # Kinds of MuJoCo's warnings that were given already.
-_said: set[str] = set()
+_given_kinds: set[str] = set()
 
 
 def can_be_marked(model: mujoco.MjModel) -> bool:
@@ -69,10 +69,9 @@ def make_mark(data: mujoco.MjData) -> float:
 def followed(data: mujoco.MjData, after_step: Callable[[], None]) -> Iterator[None]:
     """Call a function after each physics step that anybody takes on this data within the context.
 
-    While somebody follows, `mujoco.mj_step` and `mujoco.mj_step2` are replaced by functions that do
-    the same and then call the followers of their data. All code passes them, whatever framework it
-    belongs to, except code that bound the functions to names of its own
-    (`from mujoco import mj_step`).
+    Meanwhile `mujoco.mj_step` and `mujoco.mj_step2` are replaced by functions that do the same and
+    then call the followers of their data. All code calls them, whatever framework it belongs to,
+    except code that bound the functions to names of its own (`from mujoco import mj_step`).
     """
     _follow(data, after_step)
     try:
@@ -82,6 +81,7 @@ def followed(data: mujoco.MjData, after_step: Callable[[], None]) -> Iterator[No
 
 
 def _follow(data: mujoco.MjData, after_step: Callable[[], None]) -> None:
+    """Add a follower of the data; the first follower replaces MuJoCo's functions."""
     with _lock:
         if not _followers:
             for name in _STEP_FUNCTIONS:
@@ -92,6 +92,7 @@ def _follow(data: mujoco.MjData, after_step: Callable[[], None]) -> None:
 
 
 def _unfollow(data: mujoco.MjData, after_step: Callable[[], None]) -> None:
+    """Remove a follower of the data; the last follower puts MuJoCo's functions back."""
     with _lock:
         _followers[id(data)].remove(after_step)
         if not _followers[id(data)]:
@@ -129,7 +130,7 @@ def adopt_warnings() -> None:
     A handler that the user has given to `mujoco.set_mju_user_warning` stays.
     """
     if mujoco.get_mju_user_warning() in (None, _give_warning):
-        _said.clear()
+        _given_kinds.clear()
         mujoco.set_mju_user_warning(_give_warning)
 
 
@@ -138,9 +139,9 @@ def _give_warning(message: str) -> None:
     text = re.sub(r" *Time = [0-9.]+", "", " ".join(message.split()))
     kind = re.sub(r"[0-9]+", "", text)
     # an unstable simulation ends in an error, or begins anew with a warning
-    if kind in _said or "simulation is unstable" in text:
+    if kind in _given_kinds or "simulation is unstable" in text:
         return
-    _said.add(kind)
+    _given_kinds.add(kind)
     with contextlib.suppress(RippleWarning):  # no exception can pass through MuJoCo
         warn_caller(f"MuJoCo: {text}")
 

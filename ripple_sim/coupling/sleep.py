@@ -21,12 +21,12 @@ _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 # that has a velocity.
 _WAKING_VELOCITY = 1e-200
 
-# Parameters of contacts that bear as in statics, however deep the bodies lie in each other: a
-# `solref` without a spring (time constant [s] and damping ratio), and a `solimp` with an impedance
-# of nearly 1.
+# Parameters of contacts whose forces are those of statics, however deep the bodies have sunk into
+# each other: a `solref` without a spring (time constant [s] and damping ratio), and a `solimp` with
+# an impedance of nearly 1.
 _SOLREF_WITHOUT_SPRING = (1e6, 1.0)
 _SOLIMP_RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-# Geoms that are apart by less than this share of the smaller one's size are taken to touch.
+# Geoms that are apart by less than this share of the size of the smaller one touch.
 _MAX_GAP_SHARE = 1e-3
 
 
@@ -63,7 +63,7 @@ def sleeping_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> Bools:
 
 
 def wake(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int]) -> None:
-    """Wake bodies in the coming step, with all that fell asleep together with them."""
+    """Wake bodies in the coming step, and with them all bodies that fell asleep together."""
     for body in bodies:
         tree = int(model.body_treeid[body])
         if tree >= 0 and data.tree_asleep[tree] >= 0:

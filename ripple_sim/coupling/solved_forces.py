@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-# MuJoCo's mark of a contact that the constraint solver takes.
+# Value of MuJoCo's `contact.exclude` for contacts that have rows in the constraint solver.
 _HAS_ROWS = 0
 
 # Forces found from accelerations are those of the step if their sums on the bodies agree with
@@ -19,7 +19,7 @@ _RESTORED_TOLERANCE = 1e-3
 # taken in another order.
 _SAME_SUM = 1e-9
 
-# The order of a loop's calls shows as soon as something moves. So many moving steps are looked at
+# The order of a loop's calls shows as soon as something moves. So many moving steps are checked
 # first, and later one step in so many.
 _CHECKED_STEPS = 5
 _CHECK_INTERVAL = 20
@@ -52,9 +52,9 @@ class SolvedForces:
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
-        # for the poses that follow from the positions
+        # scratch for the poses that follow from the positions
         self._poses = mujoco.MjData(model)
-        # looked at so far, for the order of the loop's calls
+        # steps that were checked so far for the order of the loop's calls
         self._steps = 0
         # whether the data was ever seen after `mj_step1`
         self._has_moved_on = False

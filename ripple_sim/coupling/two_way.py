@@ -5,8 +5,8 @@ give way: a contact's gap counts from the displaced surface, and a unit of the c
 the surface as the wave solver says. The new forces replace the forces of the step, and correct the
 motion of the bodies in the step.
 
-MuJoCo takes a body over a risen surface for apart from it. `within_reach` finds such bodies by
-their support points. They get the force after which body and surface move alike.
+For MuJoCo a body over a risen surface does not touch it. `within_reach` finds such bodies by their
+support points. They get the force after which body and surface move alike.
 """
 
 from __future__ import annotations
@@ -234,7 +234,10 @@ class _Trials(NamedTuple):
     resting: WaveSolver
 
     def suit(self, waves: WaveSolver) -> bool:
-        """Whether these are copies of waves as they are now: what moves gets another operator."""
+        """Whether these are copies of waves as they are now.
+
+        Waves on a surface that has moved have another operator.
+        """
         if self.waves is not waves or self.pushed.operator is not waves.operator:
             return False
         return self.pushed.conserve_volume == waves.conserve_volume
@@ -343,7 +346,7 @@ class TwoWay:
         # heights at the beginning of the last step [m], by target
         self._heights_before: dict[TargetId, NDArray[np.float32]] = {}
         self._just_begun = True
-        # what the forces of the latest step do, to be accounted for by `settle`
+        # works of the latest step's forces, which `settle` accounts for
         self._works: list[Work] = []
 
     def solve(
@@ -386,7 +389,7 @@ class TwoWay:
         return self._loads(forces, dt, elapsed)
 
     def settle(self) -> None:
-        """Note what was paid, now that the waves have stepped."""
+        """Note the energy that pairs have paid in, now that the waves have stepped."""
         paid = {work.pair.purse: self._paid.get(work.pair.purse, 0.0) for work in self._works}
         for pair, on_bodies, force in self._works:
             height = self._places[pair.key].mean(self._waves[pair.key[0]].height)
@@ -437,9 +440,8 @@ class TwoWay:
         if not data.ncon:
             return touching
         bears = data.contact.efc_address >= 0
-        rows = contacts, _, geoms, others = pair_rows(
-            collider_ids(self._coupled, data), bears, self._is_read
-        )
+        rows = pair_rows(collider_ids(self._coupled, data), bears, self._is_read)
+        contacts, _, geoms, others = rows
         points, normals = points_outside(data, *rows, self._coupled.extents)
         ids = zip(contacts.tolist(), geoms.tolist(), others.tolist(), strict=True)
         for (number, geom, other), point, normal in zip(ids, points, normals, strict=True):
@@ -514,14 +516,14 @@ class TwoWay:
         points = np.array([contact.point for contact in touching])
         if self._coupled.convex[other] and 1 < len(points) <= MAX_CORNERS:
             # a convex geom also touches between two contacts
-            one, two = np.triu_indices(len(points), 1)
-            points = np.concatenate([points, (points[one] + points[two]) / 2])
+            first, second = np.triu_indices(len(points), 1)
+            points = np.concatenate([points, (points[first] + points[second]) / 2])
         if known is not None and known.serves(atlas, points):
             return known
         (nearest, texels) = atlas.nearest(points)
         radius = float(self._coupled.footprint_radii[[target, other]].min())
         load = _unit_load(atlas, nearest, texels, radius)
-        # what touches an open surface from inside pushes it outwards
+        # a body that touches an open surface from inside pushes it outwards
         outward = atlas.normals.reshape(-1, 3)[texels[0]]
         if not atlas.mesh.closed and touching[0].normal @ outward < 0:
             load = Load(load.texels, -load.forces)
@@ -537,7 +539,7 @@ class TwoWay:
     def _wake(self, data: mujoco.MjData) -> None:
         """Wake sleeping bodies where the surface moves faster than MuJoCo lets bodies sleep.
 
-        At the beginning all that sleep on a target are woken: what they press it with is not known.
+        At the beginning all bodies that sleep on a target are woken: their forces are not known.
         """
         model = self._coupled.model
         if not model.opt.enableflags & SLEEP:
@@ -638,11 +640,11 @@ class TwoWay:
         return Pair(
             key=key,
             height=place.mean(surface.height_now),
-            held=self._forces.get(key, 0.0),
-            start=velocity_at_start,
-            free=velocity_at_end,
+            held_force=self._forces.get(key, 0.0),
+            start_velocity=velocity_at_start,
+            end_velocity=velocity_at_end,
             mobility=mobility_at_end,
-            mean=mean_velocity,
+            mean_velocity=mean_velocity,
             mean_mobility=mobility.mean,
         )
 
@@ -651,7 +653,7 @@ class TwoWay:
     def _move(
         self, data: mujoco.MjData, change: NDArray[np.float64], dt: float, *, pending: bool
     ) -> None:
-        """Change velocities, and positions as the step would have; what sleeps stays.
+        """Change velocities, and positions as the step would have; sleeping bodies stay.
 
         Parameters
         ----------
@@ -691,7 +693,7 @@ class TwoWay:
         body_velocity = float(along @ data.qvel)
         if pending:
             body_velocity += dt * float(along @ solved.qacc)
-        approach = pair.free + pair.mobility * dt * pair.held - body_velocity
+        approach = pair.end_velocity + pair.mobility * dt * pair.held_force - body_velocity
         mobility = body_mobility + pair.mobility
         if mobility <= 0 or approach <= 0:
             return 0.0
@@ -699,7 +701,11 @@ class TwoWay:
         velocity_at_start = body_velocity - dt * float(along @ solved.qacc)
         mean_body_velocity = (velocity_at_start + body_velocity) / 2
         # the work of a share of the force is linear * share + square * share^2 [J]
-        linear = force * dt * (mean_body_velocity - pair.mean - pair.mean_mobility * dt * pair.held)
+        linear = (
+            force
+            * dt
+            * (mean_body_velocity - pair.mean_velocity - pair.mean_mobility * dt * pair.held_force)
+        )
         square = (force * dt) ** 2 * (body_mobility / 2 + pair.mean_mobility)
         force *= affordable_share(linear, square, self._paid.get(pair.purse, 0.0))
         self._move(data, force * dt * response[0], dt, pending=pending)
