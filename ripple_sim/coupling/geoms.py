@@ -21,8 +21,7 @@ TARGET_TYPES = {
     for name in ("mesh", "sdf", "sphere", "ellipsoid", "capsule", "cylinder", "box", "hfield")
 }
 
-
-# Geoms that a message lists at most.
+# Largest number of geoms that a message lists.
 _MAX_LISTED = 40
 
 # A geom as a user names it: by its name, "body/index", "geom <id>", or its id.
@@ -39,17 +38,17 @@ def geom_name(model: mujoco.MjModel, geom: GeomId) -> str:
     """Name of a geom.
 
     A geom without a name is called "body/index", by its index among the geoms of its body; a body
-    without a name counts as "body <id>". If another geom is called so, it is "geom <id>".
+    without a name counts as "body <id>". If another geom has that name, it is "geom <id>".
     """
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
     if name:
         return str(name)
     body = int(model.geom_bodyid[geom])
     body_name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body)
-    place = f"{body_name or f'body {body}'}/{geom - int(model.body_geomadr[body])}"
-    # another geom may be called so
-    taken = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, place) >= 0
-    return f"geom {geom}" if taken else place
+    index = geom - int(model.body_geomadr[body])
+    place = f"{body_name or f'body {body}'}/{index}"
+    is_taken = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, place) >= 0
+    return f"geom {geom}" if is_taken else place
 
 
 def find_geom(model: mujoco.MjModel, key: GeomKey) -> GeomId:
@@ -68,10 +67,10 @@ def find_geom(model: mujoco.MjModel, key: GeomKey) -> GeomId:
         if body >= 0 and index.isdecimal() and int(index) < model.body_geomnum[body]:
             return geom_id(int(model.body_geomadr[body]) + int(index))
     names = [geom_name(model, geom_id(i)) for i in range(model.ngeom)]
-    numbers = [f"geom {i}" for i in range(model.ngeom)]
-    for called in (names, numbers):
-        if isinstance(key, str) and key in called:
-            return geom_id(called.index(key))
+    numbered_names = [f"geom {i}" for i in range(model.ngeom)]
+    for name_list in (names, numbered_names):
+        if isinstance(key, str) and key in name_list:
+            return geom_id(name_list.index(key))
     listed = ", ".join(map(repr, names[:_MAX_LISTED])) or "none"
     if model.ngeom > _MAX_LISTED:
         listed += f" and {model.ngeom - _MAX_LISTED} more"
@@ -103,19 +102,20 @@ def find_target(model: mujoco.MjModel, key: GeomKey) -> TargetId:
     return target
 
 
-def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str, Value]:
+def by_name(model: mujoco.MjModel, values: ByGeom[Value], title: str) -> dict[str, Value]:
     """Values by the names that `target_name` gives to their geoms, flexes and skins.
 
-    Raises `SceneError` if they are no mapping, or a geom is missing, or has two values.
+    `title` names the values in messages. Raises `SceneError` if they are no mapping, or a geom is
+    missing, or has two values.
     """
     if not isinstance(values, Mapping):
-        raise SceneError(f"{what} must be a dict with a value for each geom, got {shown(values)}")
+        raise SceneError(f"{title} must be a dict with a value for each geom, got {shown(values)}")
     value_by_name: dict[str, Value] = {}
     for key, value in values.items():
         name = target_name(model, find_any(model, key))
         if name in value_by_name:
             raise SceneError(
-                f"{what} must have one entry for geom {name!r}, got two, one of them as {key!r}"
+                f"{title} must have one entry for geom {name!r}, got two, one of them as {key!r}"
             )
         value_by_name[name] = value
     return value_by_name

@@ -1,6 +1,7 @@
-"""Ids of geoms, flexes, targets and colliders: whole numbers, each numbering a type of its own.
+"""Ids of geoms, flexes, targets and colliders: whole numbers, with a type for each numbering.
 
-Geoms, flexes and skins have MuJoCo's ids. Colliders are what touches: c of them, in this order.
+Geoms, flexes and skins have MuJoCo's ids. A collider is anything that can touch. There are c of
+them, in this order:
 
     0                    the geoms, by their own ids
     ngeom                the vertices of all flexes, flex by flex

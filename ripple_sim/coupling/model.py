@@ -42,14 +42,14 @@ _FOOTPRINT_SHARE = 0.5
 
 
 def part_name(geom: str, index: int) -> str:
-    """Name of a convex part of a geom: of its collider, and of that one's mesh."""
+    """Name of a convex part of a geom: the name of its collider, and of the collider's mesh."""
     return f"{geom}#{index}"
 
 
 def find_convex_colliders(model: mujoco.MjModel) -> dict[GeomId, list[GeomId]]:
-    """Convex colliders by the id of their geom, which does not collide itself.
+    """Convex colliders by the id of the geom that they collide for, which does not collide itself.
 
-    They are mesh geoms on its body, called by its name, "#" and a number.
+    They are mesh geoms on the body of that geom. Their names are its name, "#" and a number.
     """
     parts_by_geom: dict[GeomId, list[GeomId]] = {}
     for part in map(geom_id, np.flatnonzero(model.geom_type == _MESH).tolist()):
@@ -75,9 +75,9 @@ def _whole_geom(model: mujoco.MjModel, part: GeomId) -> GeomId | None:
 
 
 def find_flex_colliders(model: mujoco.MjModel) -> dict[GeomId, FlexId]:
-    """Flex that collides instead of a geom, by geom id.
+    """The flexes that collide instead of a geom, by geom id.
 
-    It is rigid, of triangles, and has the geom's name and body.
+    Such a flex is rigid, consists of triangles, and has the name and the body of the geom.
     """
     flex_by_geom: dict[GeomId, FlexId] = {}
     for flex in range(model.nflex):
@@ -108,7 +108,10 @@ def _edge_lengths(model: mujoco.MjModel) -> NDArray[np.float64]:
 
 
 def _vertex_spacing(mesh: Mesh) -> float:
-    """Mean distance between vertices side by side [m]: no contact is known more closely."""
+    """Mean distance between neighbouring vertices [m].
+
+    The place of a contact is not known more closely.
+    """
     V = mesh.V
     F = mesh.F
     edges = V[F] - V[np.roll(F, 1, axis=1)]
@@ -180,8 +183,8 @@ class CoupledModel:
         # the flex of each vertex of a flex
         vertex_flexes = np.repeat(np.arange(model.nflex), model.flex_vertnum)
         self.names = [geom_name(model, geom) for geom in geoms] + soft_names(model)
-        whole = model.ngeom + np.arange(soft_count)
-        owners = [geoms, model.ngeom + vertex_flexes, whole]
+        soft_owners = model.ngeom + np.arange(soft_count)
+        owners = [geoms, model.ngeom + vertex_flexes, soft_owners]
         self.owners = np.concatenate(owners).astype(np.int64)
         bodies = [model.geom_bodyid, model.flex_vertbodyid, np.full(soft_count, -1)]
         self.bodies = np.concatenate(bodies).astype(np.int64)
@@ -201,10 +204,11 @@ class CoupledModel:
         radii = [_FOOTPRINT_SHARE * half_extents, spacing, endless]
         self.footprint_radii = np.concatenate(radii)
         convex = ~np.isin(model.geom_type, _TYPES_NOT_CONVEX) & ~self.has_flex[: model.ngeom]
-        in_parts = [geom for geom, parts in self.convex_colliders.items() if len(parts) > 1]
-        convex[in_parts] = False
-        never = np.zeros(model.nflexvert + soft_count, dtype=np.bool_)
-        self.convex = np.concatenate([convex, never])
+        for geom, parts in self.convex_colliders.items():
+            if len(parts) > 1:
+                convex[geom] = False
+        not_convex = np.zeros(model.nflexvert + soft_count, dtype=np.bool_)
+        self.convex = np.concatenate([convex, not_convex])
         targets = list(targets)
         self.soft = {
             target: SoftSurface(model, target) for target in targets if not is_geom(target, model)
@@ -286,7 +290,10 @@ class CoupledModel:
         return bool(len(self._soft_flexes) or others.any())
 
     def soft_flexes(self, geom: GeomId) -> NDArray[np.int64]:
-        """Flexes that MuJoCo collides with geoms that collide for this one; no flex colliders."""
+        """Flexes that MuJoCo may collide with this geom, or with geoms that collide for it.
+
+        Flex colliders are left out.
+        """
         model = self.model
         soft = self._soft_flexes
         solids = list(self.collision_geoms(geom))

@@ -67,48 +67,49 @@ def own_model(model: Any) -> mujoco.MjModel:
     Raises `SceneError` if it is something else, or has a time step, a place, a size, a mass or a
     gravity out of range.
     """
-    found = getattr(model, "ptr", model)
-    if not isinstance(found, mujoco.MjModel):
+    unwrapped = getattr(model, "ptr", model)
+    if not isinstance(unwrapped, mujoco.MjModel):
         raise SceneError(
             f"model must be a compiled mujoco.MjModel, or dm_control's, got {type(model).__name__}"
         )
-    if not 0 < found.opt.timestep <= _MAX_TIMESTEP:
+    if not 0 < unwrapped.opt.timestep <= _MAX_TIMESTEP:
         raise SceneError(
             f"the model's timestep must be greater than 0 and up to {_MAX_TIMESTEP:g} s, such "
-            f"as 0.002 (<option timestep=...>), got {found.opt.timestep:g} s"
+            f"as 0.002 (<option timestep=...>), got {unwrapped.opt.timestep:g} s"
         )
     for name in _CHECKED:
-        values = operator.attrgetter(name)(found)
-        wrong = values[~(np.abs(values) <= mujoco.mjMAXVAL)]  # NaN, too
-        if len(wrong):
+        values = operator.attrgetter(name)(unwrapped)
+        invalid = values[~(np.abs(values) <= mujoco.mjMAXVAL)]  # NaN, too
+        if len(invalid):
             raise SceneError(
-                f"the model's {name} must hold numbers up to {mujoco.mjMAXVAL:g}, got {wrong[0]:g}"
+                f"the model's {name} must hold numbers up to {mujoco.mjMAXVAL:g}, got "
+                f"{invalid[0]:g}"
             )
-    return found
+    return unwrapped
 
 
 def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco.MjData:
     """MuJoCo's data itself, also of dm_control's wrapper.
 
-    Its model is `model`, even if that was changed since, or a copy in which bodies move and
-    collide alike. Data that is only `drawn` may have a model with other numbers in the same
+    The data belongs to `model`, even if that was changed since, or to a copy in which bodies move
+    and collide alike. Data that is only `drawn` may have a model with other numbers in the same
     arrays, as for `mujoco.Renderer`: sizes and colours are then those of `model`. Raises
     `SceneError` if `data` is something else, or belongs to another model.
     """
-    found = data if isinstance(data, mujoco.MjData) else getattr(data, "ptr", None)
-    if not isinstance(found, mujoco.MjData):
+    unwrapped = data if isinstance(data, mujoco.MjData) else getattr(data, "ptr", None)
+    if not isinstance(unwrapped, mujoco.MjData):
         raise SceneError(
             f"data must be a mujoco.MjData, or dm_control's, got {type(data).__name__}"
         )
-    other = found.model
+    other = unwrapped.model
     if other is model or other in _copies.get(model, ()):
-        return found
+        return unwrapped
     differing: str | None = None
-    if not (found.signature and model.signature):
+    if not (unwrapped.signature and model.signature):
         # MuJoCo drops signatures in pickling, and gives the data a model of its own
         if _sizes(other) != _sizes(model):
             differing = "sizes"
-    elif found.signature != model.signature:
+    elif unwrapped.signature != model.signature:
         differing = "signature"
     elif not drawn:
         differing = _differing(model, other, _DYNAMICS)
@@ -120,7 +121,7 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
         )
     if not drawn:
         _copies.setdefault(model, WeakSet()).add(other)
-    return found
+    return unwrapped
 
 
 def check_targets(
@@ -134,10 +135,10 @@ def check_targets(
     if model is other:
         return
     differing = _differing(model, other, _SHAPES)
-    if differing is None and any(
-        target_name(model, target) != name for name, target in targets.items()
-    ):
-        differing = "names of geoms"
+    if differing is None:
+        for name, target in targets.items():
+            if target_name(model, target) != name:
+                differing = "names of geoms"
     if differing:
         raise SceneError(
             f"the ripples belong to another model ({_sizes(other)}) than the one to be drawn "
@@ -151,7 +152,8 @@ def posed(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
 
     The copy has the poses of its `qpos`, as `mj_forward` computes them.
     """
-    if data.xquat[0].any():  # that of the world
+    has_poses = data.xquat[0].any()  # the world's quaternion is 0 before the first computation
+    if has_poses:
         return data
     data = copy.copy(data)
     for compute in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex):

@@ -44,7 +44,7 @@ from .stepping import (
     missed_warning,
     physics_errors,
 )
-from .target import Target, contacts_of, named_targets
+from .target import ForTargets, Target, contacts_of, named_targets
 from .target_warnings import collision_warnings
 from .target_waves import Surface, TargetWaves, Whereabouts
 from .tunnelling import TunnellingCheck
@@ -126,17 +126,17 @@ class Ripples:
         model: mujoco.MjModel,
         materials: ByGeom[Material | Target] | ByGeom[Material] | ByGeom[Target],
         *,
-        resolution: int | ByGeom[int | None] | None = None,
-        layout: str | ByGeom[str] = "auto",
-        rim: Rim | ByGeom[Rim] = "free",
+        resolution: ForTargets[int | None] = None,
+        layout: ForTargets[str] = "auto",
+        rim: ForTargets[Rim] = "free",
         two_way: bool = False,
         contacts: ByGeom[Sequence[GeomKey]] | None = None,
-        high_pass: bool | ByGeom[bool] = False,
-        pulse: str | ByGeom[str] = "contact",
-        modulus: float | ByGeom[float | None] | None = None,
+        high_pass: ForTargets[bool] = False,
+        pulse: ForTargets[str] = "contact",
+        modulus: ForTargets[float | None] = None,
         backend: str = "auto",
         operator: str = "fem",
-        conserve_volume: bool | ByGeom[bool | None] | None = None,
+        conserve_volume: ForTargets[bool | None] = None,
     ) -> None:
         self.model = own_model(model)
         common = {
@@ -150,14 +150,14 @@ class Ripples:
         }
         targets = named_targets(self.model, materials, common)
         options = {"backend": backend, "operator": operator}
-        # what pushes back, and pulses of hits, need all of a force
+        # surfaces that push back, and pulses of hits, need the whole force
         can_ease = not two_way and all(target.pulse == "contact" for target in targets.values())
         self._whereabouts = Whereabouts(self.model)
         self._surfaces, self._easings = rippling_surfaces(
             self.model, targets, options, self._whereabouts, can_ease
         )
-        # by target; shared with all who load or read the waves, and see new ones as soon as they
-        # are in here
+        # by target; all who load or read the waves share this dictionary, and so see new waves as
+        # soon as it has them
         self._waves = {surface.id: surface.waves for surface in self._surfaces.values()}
         adopt_warnings()
         self._contacts = named_collision_geoms(self.model, self, contacts_of(targets, contacts))
@@ -317,15 +317,15 @@ class Ripples:
         SolverError
             If the region has another shape, or numbers that are not from 0 to 1.
         """
-        before = self._surface(name).held
+        held_before = self._surface(name).held
         try:
             held = np.asarray(region, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise SolverError(
                 f"region must be numbers from 0 to 1, one for each texel, got {region!r}"
             ) from error
-        if before is not None and held.shape == before.shape:
-            held = np.maximum(held, before)
+        if held_before is not None and held.shape == held_before.shape:
+            held = np.maximum(held, held_before)
         self._change(name, held=held)
 
     def change_operator(self, operator: str) -> None:
@@ -355,7 +355,7 @@ class Ripples:
         frame; points of an atlas, and of the waves `ripples[name]`, are in the geom's frame.
         """
         target = self._surface(name).id
-        if not is_geom(target, self.model):  # it is in the world
+        if not is_geom(target, self.model):  # a flex or a skin is in the world
             return np.array(point, dtype=np.float64)
         places = check_points(point) - self.model.geom_pos[target]
         return (places @ rotation_in_body(self.model, target)).reshape(np.shape(point))
@@ -441,7 +441,7 @@ class Ripples:
         data = own_data(self.model, data)
         with followed(data, lambda: self._follow(data)):
             yield
-        self._follow(data)  # what was stepped in other ways is warned of
+        self._follow(data)  # warns of steps that were taken in other ways
 
     def energy(self, data: mujoco.MjData) -> Energy:
         """Kinetic and potential energy of the bodies, energy of the waves, and their total [J].
@@ -510,9 +510,11 @@ class Ripples:
             self._check_amplitude.ignore(target)
 
     def _follow(self, data: mujoco.MjData) -> None:
+        """Advance the waves by the physics steps since the last call; flatten them at a reset."""
         self._whereabouts.follow(data)
         passed = self._clock.look(self.model, data)
-        # whether MuJoCo's automatic reset is disabled, and its state is broken since the last one
+        # whether MuJoCo's automatic reset is disabled, and the state has diverged since the last
+        # reset
         broken = bool(self.model.opt.disableflags & NO_RESET) and divergence(data) is not None
         if passed.reset or broken:
             self._flatten()
@@ -575,9 +577,9 @@ class Ripples:
             self._loads.take_up_all(target)
 
     def follow_shapes(self) -> None:
-        """Lay new atlases on targets whose surfaces a program has changed in the model.
+        """Lay new atlases on targets whose surfaces were changed in the model.
 
-        A surface is changed by its geom's size, the data of its height field or the vertices of its
+        A surface changes with its geom's size, the data of its height field or the vertices of its
         mesh. The waves on a new atlas begin flat. Each step does this by itself.
 
         Raises
@@ -598,10 +600,10 @@ class Ripples:
                 "waves begin flat; set surfaces before Ripples is made where that takes too long",
             )
 
-    def _couple(self, before: AmplitudeCheck | None) -> CoupledModel:
+    def _couple(self, old_check: AmplitudeCheck | None) -> CoupledModel:
         """Have the model's contacts drive the present waves, with new records of all contacts.
 
-        A target that `before` no longer watches is not warned of again.
+        There is no second warning of a target that the old check no longer watches.
         """
         coupled = CoupledModel(self.model, self._waves, self._contacts)
         rigid = {geom: self._waves[geom] for geom in self._rigid_targets()}
@@ -620,7 +622,7 @@ class Ripples:
         self._loads = ContactLoads(coupled, self._waves, hits, self._eased)
         self._check_amplitude = AmplitudeCheck(coupled, rigid, self._eased)
         for geom in rigid:
-            if before is not None and not before.watches(geom):
+            if old_check is not None and not old_check.watches(geom):
                 self._check_amplitude.ignore(geom)
         can_push = self._has_two_way and not (self._moduli or coupled.soft)
         self._two_way = TwoWay(coupled, self._waves) if can_push else None
@@ -631,6 +633,7 @@ class Ripples:
         return [target for target in self._waves if is_geom(target, self.model)]
 
     def _surface(self, name: GeomKey) -> RipplingSurface:
+        """The surface of a target; raises `SceneError` if it does not ripple."""
         surface = self._surfaces.get(name) if isinstance(name, str) else None
         if surface is None:
             surface = self._surfaces.get(target_name(self.model, find_any(self.model, name)))
@@ -670,6 +673,7 @@ class Ripples:
             self._high_pass[target] = HighPass(surface.waves, self._soft[target])
 
     def _flatten(self) -> None:
+        """Flatten all surfaces, and forget all contacts and samples."""
         self._check_amplitude.flush()
         self._loads.clear()
         if self._two_way is not None:
@@ -679,6 +683,7 @@ class Ripples:
         self._sensor_data.clear(self._whereabouts.latest)
 
     def _warn_once(self, kind: str, message: str | None) -> None:
+        """Give a warning, if there is one and none of its kind was given before."""
         if message is not None and kind not in self._warned:
             self._warned.add(kind)
             warn_caller(message)

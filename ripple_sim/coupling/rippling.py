@@ -28,7 +28,7 @@ from .watched import WatchedShape
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RipplingSurface:
-    """The surface of a target: its waves, and what they are made of.
+    """The surface of a target: its waves, and what they were made from.
 
     Attributes
     ----------
@@ -68,10 +68,10 @@ class RipplingSurface:
             ("its material is given texel by texel", _is_mapped(self.material)),
             ("sensors listen to it", bool(old.listeners.all)),
         ]
-        for what, is_tied in ties:
+        for tie, is_tied in ties:
             if is_tied:
                 raise SceneError(
-                    f"the surface of {name!r} was changed in the model, and {what}, which belongs "
+                    f"the surface of {name!r} was changed in the model, and {tie}, which belongs "
                     "to the old one: make new Ripples for the model as it is now"
                 )
         atlas = target_atlas(model, self.id, self.resolution, self.layout)
@@ -107,9 +107,9 @@ def _is_mapped(material: Material) -> bool:
 def site_on(model: mujoco.MjModel, target: TargetId, name: str) -> NDArray[np.float64]:
     """Where a site is in the frame of a target [m], [3].
 
-    The site is on the geom's body, or on one welded to it. A flex or a skin is in the world; the
-    site is then where it stands in `qpos0`. Raises `SceneError` for an unknown site, or one on a
-    body that moves against the geom's.
+    The site is on the geom's body, or on a body welded to it. The frame of a flex or a skin is the
+    world; the site is then where it stands in `qpos0`. Raises `SceneError` for an unknown site, or
+    one on a body that moves against the geom's.
     """
     site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
     if site < 0:

@@ -24,6 +24,9 @@ from .ids import (
     target_of_skin,
 )
 
+# Vertices that are nearer than this share of the surface's size are at one place.
+_SAME_PLACE = 1e-6
+
 
 def target_pose(
     data: mujoco.MjData, target: TargetId
@@ -95,11 +98,11 @@ class SoftSurface:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_flex(model, data)
-        every = self._all(data)
-        self.mesh = Mesh.from_arrays(every, F, name=f"surface of {soft_name(model, target)!r}")
+        V = self._model_vertices(data)
+        self.mesh = Mesh.from_arrays(V, F, name=f"surface of {soft_name(model, target)!r}")
         # the mesh has merged vertices that lie at one place
-        distance, self._vertices = cKDTree(every).query(self.mesh.V)
-        if distance.max() > 1e-6 * np.ptp(every, axis=0).max():
+        distance, self._vertices = cKDTree(V).query(self.mesh.V)
+        if distance.max() > _SAME_PLACE * np.ptp(V, axis=0).max():
             raise SceneError(
                 f"the surface of {soft_name(model, target)!r} is not that of its vertices"
             )
@@ -127,11 +130,11 @@ class SoftSurface:
 
     def vertices(self, data: mujoco.MjData) -> NDArray[np.float64]:
         """Where the vertices of the mesh are in the world [m], [n, 3]."""
-        return self._all(data)[self._vertices]
+        return self._model_vertices(data)[self._vertices]
 
     @property
     def bodies(self) -> NDArray[np.int64]:
-        """Bodies that carry it."""
+        """Bodies that carry the surface."""
         model = self._model
         if self._skin >= 0:
             return np.unique(model.skin_bonebodyid[self._bones]).astype(np.int64)
@@ -139,9 +142,9 @@ class SoftSurface:
         count = model.flex_vertnum[self.flex]
         bodies = model.flex_vertbodyid[first : first + count]
         if model.flex_interp[self.flex]:
-            node = model.flex_nodeadr[self.flex]
-            nodes = model.flex_nodenum[self.flex]
-            bodies = model.flex_nodebodyid[node : node + nodes]
+            first_node = model.flex_nodeadr[self.flex]
+            node_count = model.flex_nodenum[self.flex]
+            bodies = model.flex_nodebodyid[first_node : first_node + node_count]
         return np.unique(bodies[bodies >= 0]).astype(np.int64)
 
     @property
@@ -152,34 +155,38 @@ class SoftSurface:
         """
         return 0 if self._skin >= 0 else int(self._model.flex_interp[self.flex])
 
-    def _all(self, data: mujoco.MjData) -> NDArray[np.float64]:
-        """Where all vertices of the model are in the world [m], also those at one place."""
+    def _model_vertices(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Where the vertices of the flex or skin in the model are in the world [m].
+
+        Several of them may be at one place.
+        """
         model = self._model
         if self._skin >= 0:
-            return self._all_of_skin(data)
+            return self._skin_vertices(data)
         first = model.flex_vertadr[self.flex]
         count = model.flex_vertnum[self.flex]
         return np.array(data.flexvert_xpos[first : first + count], dtype=np.float64)
 
-    def _all_of_skin(self, data: mujoco.MjData) -> NDArray[np.float64]:
+    def _skin_vertices(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Where the bones of the skin take its vertices, as weighted means [m]."""
         model = self._model
         first = model.skin_vertadr[self._skin]
         count = model.skin_vertnum[self._skin]
         V = model.skin_vert[first : first + count].astype(np.float64)
         moved = np.zeros_like(V)
         rotation = np.zeros(9)
-        turn = np.zeros(4)
-        back = np.zeros(4)
+        quaternion = np.zeros(4)
+        inverse_bind = np.zeros(4)
         for bone in range(self._bones.start, self._bones.stop):
             body = model.skin_bonebodyid[bone]
-            mujoco.mju_negQuat(back, model.skin_bonebindquat[bone].astype(np.float64))
-            mujoco.mju_mulQuat(turn, data.xquat[body], back)
-            mujoco.mju_quat2Mat(rotation, turn)
+            mujoco.mju_negQuat(inverse_bind, model.skin_bonebindquat[bone].astype(np.float64))
+            mujoco.mju_mulQuat(quaternion, data.xquat[body], inverse_bind)
+            mujoco.mju_quat2Mat(rotation, quaternion)
             begin = model.skin_bonevertadr[bone]
-            which = slice(begin, begin + model.skin_bonevertnum[bone])
-            vertices = model.skin_bonevertid[which]
-            weights = model.skin_bonevertweight[which, None]
+            rows = slice(begin, begin + model.skin_bonevertnum[bone])
+            vertices = model.skin_bonevertid[rows]
+            weights = model.skin_bonevertweight[rows, None]
             on_bone = V[vertices] - model.skin_bonebindpos[bone]
-            placed = on_bone @ rotation.reshape(3, 3).T + data.xpos[body]
-            np.add.at(moved, vertices, weights * placed)
+            in_world = on_bone @ rotation.reshape(3, 3).T + data.xpos[body]
+            np.add.at(moved, vertices, weights * in_world)
         return moved

@@ -1,7 +1,8 @@
 """Default coefficients and default resolution of a target, from the model.
 
 Materials are chosen by the bodies that can touch the target, by how far they fall, and by the time
-step; resolutions are fine enough for what touches it and coarse enough for the time step.
+step. Resolutions are fine enough for the bodies that touch the target, and coarse enough for the
+time step.
 """
 
 from __future__ import annotations
@@ -49,18 +50,18 @@ _DEFAULT_DENSITY = 1000.0
 _HIT_DENT = 0.085
 _REST_DENT = 0.05
 
-# The same where forces are eased. The lightest body leaves a ring that is seen once the body has
-# left, and sinks in by the second share at rest.
+# The same dents where forces are eased. The lightest body leaves a ring that is visible once the
+# body has left, and sinks in by the second share at rest.
 _EASED_HIT_DENT = 0.265
 _EASED_REST_DENT = 0.1
 
-# Power of a footprint's width, over the least one, with which the dent of a narrower body falls.
+# The allowed dent of a body narrower than the least footprint goes with this power of its width.
 _NARROW_POWER = 0.3
 
 # Dent over the target's radius up to which forces are taken up, see `EasingLaw`.
 _EASED_DENT = 0.12
 
-# The least density over the one for the heaviest body: a body that is lighter still is a speck.
+# The least density over the density for the heaviest body: even lighter bodies are specks.
 _MIN_DENSITY_RATIO = 1e-6
 
 # Time that most of a contact's impulse takes, over the time constant of its `solref`.
@@ -69,25 +70,29 @@ _PULSE_SHARE = 0.4
 # Wave number of the longest wave on a ball, times its size: sqrt(8).
 _LONGEST_WAVE_NUMBER = 8**0.5
 
-# Most that sqrt(stiffness) times the time step may be: a swing takes twelve steps or more. Faster
+# Largest product of sqrt(stiffness) and the time step: a swing takes twelve steps or more. Faster
 # swings are not resolved, and take up energy from contacts that last a step.
 _MAX_PHASE_STEP = 0.5
+
+# Height from which a body falls, over the target's size, at most: bodies higher up wait to be
+# dropped.
+_MAX_FALL_HEIGHT = 2.0
 
 # Dent of a typical hit over the target's size, and at most over half its usual thickness.
 _TYPICAL_DENT = 0.05
 _MAX_TYPICAL_DENT = 0.5
 
-# Resolutions that are chosen, in texels along a chart's side: the least, the usual and the most.
+# Resolutions that are chosen, in texels along a chart's side: the lowest, the usual, the highest.
 LEAST = 32
 USUAL = 96
 MOST = 256
 # Chosen resolutions are multiples of this.
 _RESOLUTION_STEP = 16
 
-# Texels that the radius of a footprint is to hold.
+# Texels along the radius of a footprint.
 _FOOTPRINT_TEXELS = 4.0
 
-# Most substeps of the waves in a physics step.
+# Largest number of substeps of the waves in a physics step.
 _MAX_SUBSTEPS = 4.0
 
 # Stable time step over the time that a wave takes from texel to texel, on meshes with limbs (0.29
@@ -95,7 +100,7 @@ _MAX_SUBSTEPS = 4.0
 # a mean spacing d.
 _STABLE_SHARE = 0.35
 
-# Rings of a body so many times as light as the weight that the surface is to bear are not seen.
+# Rings of a body are not visible if the surface bears a weight so many times its own.
 _MAX_MASS_RATIO = 100.0
 
 # Resolution of flexes and skins, in texels along a chart's side.
@@ -154,10 +159,14 @@ class Extent(NamedTuple):
         size = float(np.ptp(mesh.V, axis=0).max())
         normals /= np.maximum(2 * areas, _MIN_DIVISOR)[:, None]
         radii = half_thickness_at(mesh, (a + b + c) / 3 + middle, normals)
+        # the median over the area
         order = np.argsort(radii)
-        middle_one = order[np.searchsorted(np.cumsum(areas[order]), area / 2)]
+        median = order[np.searchsorted(np.cumsum(areas[order]), area / 2)]
         return cls(
-            size, area, max(volume, _MIN_VOLUME_SHARE * size * area), float(radii[middle_one])
+            size=size,
+            area=area,
+            volume=max(volume, _MIN_VOLUME_SHARE * size * area),
+            radius=float(radii[median]),
         )
 
 
@@ -223,10 +232,10 @@ def suited_material(
     if not can_ease or _reduced_masses(coupled, geom).max() == 0:
         return SuitedMaterial(_filled_in(material, speed, stiffness, density))
     lightest = lightest_hit(coupled, geom, extent)
-    footprint = heaviest(coupled, geom)[1]
+    _, footprint = heaviest(coupled, geom)
     if lightest is not None:
         footprint = lightest.footprint
-        shown = _density_for(
+        density_for_lightest = _density_for(
             coupled,
             geom,
             extent,
@@ -236,7 +245,7 @@ def suited_material(
             dent=_eased_hit_dent(lightest, extent),
             sink=_EASED_REST_DENT * extent.radius,
         )
-        density = min(density, max(shown, _MIN_DENSITY_RATIO * density))
+        density = min(density, max(density_for_lightest, _MIN_DENSITY_RATIO * density))
     easing = EasingLaw.of(
         _EASED_DENT,
         extent.radius,
@@ -400,18 +409,25 @@ def lightest_hit(coupled: CoupledModel, geom: GeomId, extent: Extent) -> Hit | N
         return None
     lightest = geom_id(int(others[np.argmin(reduced[others])]))
     moves = bool(_moves(model)[lightest])
-    height = min(max(extent.size, _height(coupled, geom)), 2 * extent.size)
     return Hit(
         mass=float(reduced[lightest]),
         weight=float(masses[lightest] if moves else masses[geom]),
         footprint=float(coupled.footprint_radii[[geom, lightest]].min()),
-        speed=_fall(model, height),
+        speed=_fall(model, _fall_height(coupled, geom, extent)),
     )
 
 
+def _fall_height(coupled: CoupledModel, geom: GeomId, extent: Extent) -> float:
+    """Height from which a typical body falls on a target [m]."""
+    height = max(extent.size, _height(coupled, geom))
+    return min(height, _MAX_FALL_HEIGHT * extent.size)
+
+
 def _density(mass: float, extent: Extent) -> float:
-    """Mass of a body over the area of a target [kg/m^2]; a mass of 0 stands for none given."""
-    return (mass if mass > 0 else _DEFAULT_DENSITY * extent.volume) / extent.area
+    """Mass of a body over the area of a target [kg/m^2]; a mass of 0 stands for an unknown one."""
+    if mass <= 0:
+        mass = _DEFAULT_DENSITY * extent.volume
+    return mass / extent.area
 
 
 def _speed(model: mujoco.MjModel, extent: Extent) -> float:
@@ -425,17 +441,20 @@ def _fall(model: mujoco.MjModel, height: float) -> float:
 
 
 def _height(coupled: CoupledModel, geom: GeomId) -> float:
-    """From how high bodies fall on a target at the model's beginning, or it on them [m]."""
+    """Greatest height from which bodies fall on a target as the model begins, or it on them [m].
+
+    It is measured between the bounding spheres of the two geoms.
+    """
     model = coupled.model
     data = mujoco.MjData(coupled.model)
     mujoco.mj_kinematics(model, data)
     gravity = float(np.linalg.norm(model.opt.gravity))
     up = -model.opt.gravity / max(gravity, _MIN_DIVISOR)
-    above = (data.geom_xpos - data.geom_xpos[geom]) @ up
-    between = np.abs(above) - model.geom_rbound - model.geom_rbound[geom]
+    heights = (data.geom_xpos - data.geom_xpos[geom]) @ up
+    gaps = np.abs(heights) - model.geom_rbound - model.geom_rbound[geom]
     moves = _moves(model)
-    falls = np.where(above > 0, moves, moves[geom]) & coupled.can_collide(geom)
-    return float(between[falls].max(initial=0.0))
+    falls = np.where(heights > 0, moves, moves[geom]) & coupled.can_collide(geom)
+    return float(gaps[falls].max(initial=0.0))
 
 
 def _resting(coupled: CoupledModel, geom: GeomId) -> float:
@@ -500,14 +519,13 @@ def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
     touching = np.flatnonzero(reduced)
     if not len(touching):
         raise SceneError(f"{needs}: nothing that moves can touch it in the model")
-    middle = int(touching[np.argsort(reduced[touching])[len(touching) // 2]])
-    mass = float(reduced[middle])
-    footprint = float(coupled.footprint_radii[[geom, middle]].min())
-    fall = _fall(model, min(max(extent.size, _height(coupled, geom)), 2 * extent.size))
+    by_mass = touching[np.argsort(reduced[touching])]
+    median = int(by_mass[len(by_mass) // 2])
+    speed = _fall(model, _fall_height(coupled, geom, extent))
     return {
         "size": extent.size,
-        "hit": (mass, fall),
-        "radius": footprint,
+        "hit": (float(reduced[median]), speed),
+        "radius": float(coupled.footprint_radii[[geom, median]].min()),
         "amplitude": min(_TYPICAL_DENT, _MAX_TYPICAL_DENT * extent.radius / extent.size),
     }
 
@@ -521,16 +539,20 @@ def suited_resolution(
     that can touch the target; but no more than can be stepped in four substeps a physics step, as
     estimated before the atlas is made.
     """
-    spacing = np.sqrt(extent.area / 6)  # of texels, times the resolution [m]
+    chart_side = np.sqrt(extent.area / 6)  # of a cube's chart [m]
     _, footprint = heaviest(coupled, geom)
-    resolved = _FOOTPRINT_TEXELS * spacing / footprint if 0 < footprint < np.inf else 0.0
-    n = int(np.clip(_RESOLUTION_STEP * np.ceil(resolved / _RESOLUTION_STEP), USUAL, MOST))
+    needed = 0.0  # texels along a chart's side
+    if 0 < footprint < np.inf:
+        needed = _FOOTPRINT_TEXELS * chart_side / footprint
+    n = int(np.clip(_RESOLUTION_STEP * np.ceil(needed / _RESOLUTION_STEP), USUAL, MOST))
     speed = float(np.max(material.speed))
     bending = float(np.max(material.bending))
     viscosity = float(np.max(material.viscosity))
     stiffness = float(np.max(material.stiffness))
     while n > LEAST:
-        eigenvalue = (2 / (_STABLE_SHARE * (spacing / n))) ** 2
+        eigenvalue = (
+            2 / (_STABLE_SHARE * (chart_side / n))
+        ) ** 2  # largest of the operator [1/m^2]
         wave = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness
         viscous = viscosity * eigenvalue
         substeps = coupled.model.opt.timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4
@@ -592,7 +614,7 @@ def suited_targets(
 def _suited_to_soft(model: mujoco.MjModel, target: TargetId, material: Material) -> Material:
     """The material of a flex or a skin, filled in by its size and the mass of its bodies.
 
-    What may hit it is not looked at.
+    The bodies that may hit it are not taken into account.
     """
     if not material.unset:
         return material
@@ -614,13 +636,14 @@ def _is_intricate(mesh: Mesh) -> bool:
 
 
 def _warn_of_unseen(coupled: CoupledModel, name: str, geom: GeomId, extent: Extent) -> None:
-    """Warn of a target that is made so heavy that hits of a light body will not be seen."""
+    """Warn of a target that is made so heavy that hits of a light body are not visible."""
     reduced = _reduced_masses(coupled, geom)
-    heavy = max(_resting(coupled, geom), float(reduced.max()))
-    light = float(reduced[reduced > 0].min(initial=np.inf))
-    if heavy > _MAX_MASS_RATIO * light:
+    heaviest_mass = max(_resting(coupled, geom), float(reduced.max()))
+    lightest_mass = float(reduced[reduced > 0].min(initial=np.inf))
+    if heaviest_mass > _MAX_MASS_RATIO * lightest_mass:
         warn_caller(
-            f"the surface of geom {name!r} is to bear {heavy:.2g} kg: hits of bodies as light as "
-            f"{light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, "
-            f"hit=({light:.2g}, m/s)) is suited to them"
+            f"the surface of geom {name!r} is to bear {heaviest_mass:.2g} kg: hits of bodies as "
+            f"light as {lightest_mass:.2g} kg will not be seen; "
+            f"Material.suited(size={extent.size:.2g}, hit=({lightest_mass:.2g}, m/s)) is suited to "
+            "them"
         )

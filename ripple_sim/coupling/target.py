@@ -18,7 +18,10 @@ from .geoms import ByGeom, GeomKey, Value, by_name, find_target
 # Version in which keyword arguments of `Ripples` no longer take mappings by geom.
 _MAPPINGS_END = "2.0"
 
-# Fields that mean nothing to some targets: only hits with Hertz's pulse have a modulus.
+# A value for all targets. A mapping of values by geom is deprecated: `Target` takes its place.
+ForTargets = Value | ByGeom[Value]
+
+# Fields that have no meaning for some targets: only hits with Hertz's pulse have a modulus.
 _OPTIONAL_FIELDS = ("modulus",)
 
 
@@ -116,7 +119,7 @@ def named_targets(
 
 
 def _value_for_each(
-    model: mujoco.MjModel, targets: Iterable[str], field: str, value: Value | ByGeom[Value]
+    model: mujoco.MjModel, targets: Iterable[str], field: str, value: ForTargets[Value]
 ) -> dict[str, Value]:
     """The value of a field for each target.
 
@@ -154,8 +157,9 @@ def contacts_of(targets: Mapping[str, Target], contacts: Any) -> ByGeom[Sequence
             _MAPPINGS_END,
         )
     else:
-        return contacts  # refused where it is read
-    named = {
-        name: target.contacts for name, target in targets.items() if target.contacts is not None
-    }
-    return {**contacts, **named}
+        return contacts  # `named_collision_geoms` refuses it
+    geoms_by_target = dict(contacts)
+    for name, target in targets.items():
+        if target.contacts is not None:
+            geoms_by_target[name] = target.contacts
+    return geoms_by_target

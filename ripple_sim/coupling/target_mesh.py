@@ -23,6 +23,7 @@ from .soft import SoftSurface
 # Longest edge of a triangle over the size of the primitive.
 _LONGEST_EDGE = 1 / 24
 
+# Sides of a cylinder.
 _CYLINDER_SIDES = 96
 
 # Subdivisions of an icosahedron for a sphere or an ellipsoid.
@@ -31,7 +32,7 @@ _SPHERE_SUBDIVISIONS = 4
 # Sides of a capsule along and around its caps.
 _CAPSULE_SIDES = (48, 48)
 
-# Atlases that are kept, and their most texels: 20 MB.
+# Number of atlases that are kept, and the largest number of texels of each: 20 MB.
 _KEPT_ATLASES = 4
 _MAX_KEPT_TEXELS = 100_000
 

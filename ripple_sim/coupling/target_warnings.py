@@ -1,6 +1,6 @@
-"""Warnings of targets that contacts do not meet.
+"""Warnings of targets whose contacts are missing or wrong.
 
-Nothing can touch such a target, or it collides off the surface that ripples, or MuJoCo tells no
+Nothing can touch such a target, or it collides off the surface that ripples, or MuJoCo reports no
 forces of its contacts.
 """
 
@@ -23,17 +23,17 @@ from .target_mesh import mesh_arrays, primitive_triangles
 
 _GEOM = mujoco.mjtGeom
 
-# What an open mesh may be replaced by, since only a closed one collides as a signed distance.
+# Advice for open meshes: only a closed mesh collides as a signed distance.
 CLOSED_ADVICE = "a closed mesh (repair=True of load_mesh, --repair of the command)"
 
-# Points of the rippling surface at which its distance is taken, at most.
+# Largest number of points of the rippling surface at which its distance is measured.
 _GAP_POINTS = 1500
 
-# A collision surface off the true one by this share of the target's size shows: bodies stop in
-# mid-air.
+# A collision surface that is off the true surface by this share of the target's size shows: bodies
+# stop in mid-air.
 GAP_TOLERANCE = 0.02
 
-# The same for geoms that were made to collide in place of a finer one.
+# The same share for geoms that were made to collide in place of a finer one.
 COARSE_TOLERANCE = 0.1
 
 
@@ -77,16 +77,17 @@ def collision_gap(
     ]
     if not solids:
         return 0.0
-    every = atlas.positions.reshape(-1, 3)
-    stride = -(-len(every) // _GAP_POINTS)
+    positions = atlas.positions.reshape(-1, 3)
+    stride = -(-len(positions) // _GAP_POINTS)
     rotation = data.geom_xmat[target].reshape(3, 3)
-    points = data.geom_xpos[target] + every[::stride] @ rotation.T
-    outside = np.full(len(points), np.inf)
+    points = data.geom_xpos[target] + positions[::stride] @ rotation.T
+    # from the nearest solid, negative inside [m]
+    distances = np.full(len(points), np.inf)
     for geom in solids:
         V, F = _collision_surface(coupled, geom)
         local = (points - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
-        outside = np.minimum(outside, igl.signed_distance(local, V, F)[0])
-    return float(max(outside.max(), -np.median(outside)))
+        distances = np.minimum(distances, igl.signed_distance(local, V, F)[0])
+    return float(max(distances.max(), -np.median(distances)))
 
 
 def _collision_surface(
@@ -105,9 +106,9 @@ def _collision_surface(
 
 
 def collision_warnings(coupled: CoupledModel, geom: GeomId, atlas: Atlas) -> Iterator[str]:
-    """Warnings of contacts that a target gets wrongly, or not at all.
+    """Warnings of a target whose contacts are missing or wrong.
 
-    Nothing can touch it, it collides off its surface, or MuJoCo tells no forces of its contacts.
+    Nothing can touch it, it collides off its surface, or MuJoCo reports no forces of its contacts.
     """
     model = coupled.model
     solids = coupled.collision_geoms(geom)
@@ -122,15 +123,14 @@ def collision_warnings(coupled: CoupledModel, geom: GeomId, atlas: Atlas) -> Ite
         yield from _hull_warning(coupled, geom, atlas)
     elif model.geom_type[geom] == _GEOM.mjGEOM_SDF:
         yield from _sdf_warning(coupled, geom)
-    # not in MuJoCo's older versions
-    passive = getattr(model, "flex_passive", np.zeros(model.nflex))
+    # MuJoCo's older versions have no passive contacts
+    is_passive = getattr(model, "flex_passive", np.zeros(model.nflex))
     for flex in coupled.soft_flexes(geom).tolist():
-        if passive[flex]:
+        if is_passive[flex]:
             yield (
-                f"MuJoCo tells no forces of the passive contacts of flex "
-                f"{coupled.names[model.ngeom + flex]!r}, under "
-                f"which geom {coupled.names[geom]!r} will not ripple; set "
-                'passive="false" in the flex\'s <contact>'
+                "MuJoCo tells no forces of the passive contacts of flex "
+                f"{coupled.names[model.ngeom + flex]!r}, under which geom {coupled.names[geom]!r} "
+                'will not ripple; set passive="false" in the flex\'s <contact>'
             )
 
 

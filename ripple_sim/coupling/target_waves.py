@@ -53,7 +53,7 @@ class Whereabouts:
         self._data = data
 
     def data(self, data: mujoco.MjData | None = None) -> mujoco.MjData:
-        """The given data, with poses; by default the latest.
+        """The data that are given, with poses; by default the latest data.
 
         Raises `SceneError` if `data` belongs to another model.
         """

@@ -27,7 +27,7 @@ _SAFE_DEPTH_IN_FLEX = 0.7
 # The check runs once in so many steps, and looks as many steps ahead.
 _CHECK_EVERY = 5
 
-# A warning comes again for a pair that has so many times less time to stop than the pair of the
+# A second warning is given for a pair that has this factor less time to stop than the pair of the
 # last warning.
 _WORSE = 2.0
 
@@ -52,13 +52,13 @@ class TunnellingCheck:
     A geom that arrives at speed v sinks in by about v dt before MuJoCo sees the contact, and then
     by v t_stop before the contact's spring has stopped it: t_stop = tau zeta exp(-zeta) for a
     `solref` of time constant tau and damping ratio zeta (a critically damped spring at zeta = 1).
-    Past the sum of the two geoms' smallest half-extents it comes out on the other side or stays
-    inside; the first geoms that did so were seen at 0.9 of the sum. A geom that is inside an SDF
-    geom by more than its own half-extent is pushed from all sides: the normal forces then add up to
-    many times the momentum exchanged. A warning names the worst pair, and comes again only where
-    another pair is twice as bad: a humanoid that falls has dozens of pairs, and one advice serves
-    them all. MuJoCo's speculative contacts, where the version has them and they are enabled, stop
-    geoms in time, but not at SDF geoms or flexes: then only SDF geoms and flexes are checked.
+    If it sinks in by more than the sum of the two geoms' smallest half-extents, it comes out on the
+    other side or stays inside; the first geoms did so at 0.9 of the sum. A geom that is inside an
+    SDF geom by more than its own half-extent is pushed from all sides: the normal forces then add
+    up to many times the momentum exchanged. A warning names the worst pair. A second warning is
+    given only if another pair is twice as bad: a humanoid that falls has dozens of pairs, and one
+    advice serves them all. MuJoCo's speculative contacts, if the version has them and they are
+    enabled, stop geoms in time, but not at SDF geoms or flexes: then only those are checked.
 
     A flex collider holds geoms off by its thickness, which counts in place of the half-extent of
     its geom. Cylinders that sink in by 0.7 of the thickness begin to be thrown aside.
@@ -73,7 +73,7 @@ class TunnellingCheck:
         self._model = coupled.model
         self._names = coupled.names
         self._pairs = _watched_pairs(coupled, targets)
-        # time within which the pair of the last warning would have had to stop [s]
+        # time that the pair of the last warning had to stop [s]
         self._warned_time = np.inf
         self._steps = 0
 
@@ -133,14 +133,14 @@ def too_fast(
     # MuJoCo gives a body's velocity at the centre of mass of the tree that it belongs to
     from_root = data.geom_xpos - data.subtree_com[model.body_rootid[body]]
     velocities = data.cvel[body, 3:] + np.cross(data.cvel[body, :3], from_root)
-    away = data.geom_xpos[other] - data.geom_xpos[target]
-    relative = velocities[other] - velocities[target]
-    distances = np.linalg.norm(away, axis=1)
-    speeds = np.linalg.norm(relative, axis=1)
-    near = distances < pairs["range"] + (1 + steps) * speeds * timestep
-    approaching = np.einsum("ij,ij->i", away, relative) < 0
+    offsets = data.geom_xpos[other] - data.geom_xpos[target]
+    relative_velocities = velocities[other] - velocities[target]
+    distances = np.linalg.norm(offsets, axis=1)
+    speeds = np.linalg.norm(relative_velocities, axis=1)
+    may_touch = distances < pairs["range"] + (1 + steps) * speeds * timestep
+    approaching = np.einsum("ij,ij->i", offsets, relative_velocities) < 0
     too_deep = speeds * (timestep + pairs["stopping_time"]) > pairs["limit"]
-    rows = np.flatnonzero(near & approaching & too_deep)
+    rows = np.flatnonzero(may_touch & approaching & too_deep)
     return rows, speeds[rows]
 
 
@@ -186,16 +186,16 @@ def _safe_depths(coupled: CoupledModel, target: Ints, other: Ints) -> Floats:
     """Depth up to which a contact of each pair of geoms is safe [m], [p]."""
     model = coupled.model
     extents = coupled.collider_extents
-    sdf = _is_sdf(model)
-    flex = coupled.has_flex[: model.ngeom]
-    cylinder = model.geom_type == mujoco.mjtGeom.mjGEOM_CYLINDER
-    limit = _SAFE_DEPTH * (extents[target] + extents[other])
-    for geom, around in ((target, other), (other, target)):
-        in_sdf = np.where(sdf[around], _SAFE_DEPTH_IN_SDF * extents[geom], np.inf)
-        is_thrown_aside = flex[around] & cylinder[geom]
-        safe = np.where(is_thrown_aside, _SAFE_DEPTH_IN_FLEX * extents[around], in_sdf)
-        limit = np.minimum(limit, safe)
-    return limit
+    is_sdf = _is_sdf(model)
+    has_flex = coupled.has_flex[: model.ngeom]
+    is_cylinder = model.geom_type == mujoco.mjtGeom.mjGEOM_CYLINDER
+    limits = _SAFE_DEPTH * (extents[target] + extents[other])
+    for geom, partner in ((target, other), (other, target)):
+        in_sdf = np.where(is_sdf[partner], _SAFE_DEPTH_IN_SDF * extents[geom], np.inf)
+        is_thrown_aside = has_flex[partner] & is_cylinder[geom]
+        in_flex = _SAFE_DEPTH_IN_FLEX * extents[partner]
+        limits = np.minimum(limits, np.where(is_thrown_aside, in_flex, in_sdf))
+    return limits
 
 
 def _stopping_times(coupled: CoupledModel, target: Ints, other: Ints) -> Floats:
@@ -203,8 +203,9 @@ def _stopping_times(coupled: CoupledModel, target: Ints, other: Ints) -> Floats:
     solref = (coupled.solref[target] + coupled.solref[other]) / 2
     # negative numbers are -stiffness and -damping for each kg: omega = sqrt(stiffness), ratio =
     # damping / (2 omega)
-    direct = solref[:, 0] <= 0
-    omega = np.sqrt(np.where(direct, np.maximum(-solref[:, 0], _MIN_SQUARED_RATE), 1.0))
-    constant = np.maximum(solref[:, 0], 2 * coupled.model.opt.timestep)
-    ratio = np.where(direct, -solref[:, 1] / (2 * omega), solref[:, 1])
-    return np.where(direct, 1 / omega, constant * ratio) * np.exp(-np.clip(ratio, 0, 1))
+    is_direct = solref[:, 0] <= 0
+    omega = np.sqrt(np.where(is_direct, np.maximum(-solref[:, 0], _MIN_SQUARED_RATE), 1.0))
+    time_constant = np.maximum(solref[:, 0], 2 * coupled.model.opt.timestep)
+    ratio = np.where(is_direct, -solref[:, 1] / (2 * omega), solref[:, 1])
+    times = np.where(is_direct, 1 / omega, time_constant * ratio)
+    return times * np.exp(-np.clip(ratio, 0, 1))

@@ -23,12 +23,13 @@ from .ids import TargetId, geom_id, target_of_flex, target_of_skin
 
 _OBJECT = mujoco.mjtObj
 
+# Types of objects that may ripple.
 _TARGET_TYPES = (_OBJECT.mjOBJ_GEOM, _OBJECT.mjOBJ_FLEX, _OBJECT.mjOBJ_SKIN)
 
 # Beginning of the names of the tuples; `attach` may put a prefix before it.
 _TUPLE = "ripple-sim sensor "
 
-# Samples in a time step at most; a sensor of 48,000 samples a second has 48 in one of 1 ms.
+# Largest number of samples in a time step; a sensor of 48,000 samples a second has 48 in 1 ms.
 _MAX_SAMPLES = 100_000
 
 # Share of a sample by which the samples in a time step may differ from a whole number.
@@ -88,7 +89,7 @@ def add_sensor(
     spec : mujoco.MjSpec
         Changed in place, before it is compiled. Set its time step first.
     name : str
-        Of the sensor.
+        Name of the sensor.
     geom : str
         Name of the geom, flex or skin that ripples.
     site : str

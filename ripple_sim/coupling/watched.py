@@ -1,7 +1,7 @@
-"""Arrays of a model that its user may write to at any time, looked at before each frame or step.
+"""Arrays of a model that its user may write to at any time, compared before each frame or step.
 
-A look at a large array costs no more than one at a small one: samples of all of it are compared,
-and one stretch after another whole.
+Comparing a large array takes no longer than comparing a small one: of a large array only samples
+are compared, and one stretch after another completely.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from .ids import TargetId, is_geom
 
-# Arrays up to this size are compared whole at each look, in some 0.05 ms [bytes].
+# Arrays up to this size are compared completely each time, in some 0.05 ms [bytes].
 _MAX_WHOLE_SIZE = 1 << 20
 
-# Length of the stretch of a larger array that is compared at each look, one after another [bytes].
+# Length of the stretch of a larger array that is compared each time, one after another [bytes].
 _STRETCH = 1 << 18
 
-# Samples of a larger array that are compared at each look.
+# Number of samples of a larger array that are compared each time.
 _SAMPLES = 4096
 
 
@@ -31,45 +31,45 @@ class WatchedArray:
     """Tells whether an array was written to; it must be contiguous."""
 
     def __init__(self, array: NDArray) -> None:
-        # where the next stretch begins [bytes]
-        self._next = 0
+        self._stretch_start = 0  # of the next stretch [bytes]
         self.take(array)
 
     def take(self, array: NDArray) -> None:
         """Remember the array as it is now."""
-        self._taken = _bytes_of(array).copy()
-        self._step = max(len(self._taken) // _SAMPLES, 1)
+        self._remembered = _bytes_of(array).copy()
+        self._sample_distance = max(len(self._remembered) // _SAMPLES, 1)  # [bytes]
 
     def changed(self, array: NDArray) -> bool:
-        """Whether the array differs from the remembered one, as far as this look goes.
+        """Whether the array differs from the remembered one, as far as it is compared.
 
-        An array of at most 1 MiB is compared whole. A larger one is compared at samples of all of
-        it, and over the next stretch.
+        An array of at most 1 MiB is compared completely. A larger one is compared at samples, and
+        over the next stretch.
         """
-        now = _bytes_of(array)
-        taken = self._taken
-        if len(now) <= _MAX_WHOLE_SIZE:
-            return not np.array_equal(now, taken)
-        stretch = slice(self._next, self._next + _STRETCH)
-        self._next = stretch.stop if stretch.stop < len(now) else 0
-        if not np.array_equal(now[stretch], taken[stretch]):
+        current = _bytes_of(array)
+        remembered = self._remembered
+        if len(current) <= _MAX_WHOLE_SIZE:
+            return not np.array_equal(current, remembered)
+        stretch = slice(self._stretch_start, self._stretch_start + _STRETCH)
+        self._stretch_start = stretch.stop if stretch.stop < len(current) else 0
+        if not np.array_equal(current[stretch], remembered[stretch]):
             return True
-        return not np.array_equal(now[:: self._step], taken[:: self._step])
+        samples = np.s_[:: self._sample_distance]
+        return not np.array_equal(current[samples], remembered[samples])
 
     def differs(self, array: NDArray, start: int, count: int) -> bool:
         """Whether `count` bytes from the byte `start` on differ from the remembered ones."""
-        part = slice(start, start + count)
-        return not np.array_equal(_bytes_of(array)[part], self._taken[part])
+        span = slice(start, start + count)
+        return not np.array_equal(_bytes_of(array)[span], self._remembered[span])
 
 
 class WatchedShape:
-    """Tells whether a program has given a geom another surface: another size, height field or mesh.
+    """Tells whether a geom's surface was changed in the model: its size, height field or mesh.
 
     Parameters
     ----------
     model : mujoco.MjModel
     target : TargetId
-        What is soft has no shape of its own, and never changes.
+        The shape of a flex or a skin never changes.
     """
 
     def __init__(self, model: mujoco.MjModel, target: TargetId) -> None:
@@ -77,14 +77,14 @@ class WatchedShape:
         self._watched = [WatchedArray(array) for array in self._arrays(model)]
 
     def changed(self, model: mujoco.MjModel) -> bool:
-        """Whether the surface is another one than at the beginning."""
+        """Whether the surface differs from the one at the beginning."""
         return any(
             watched.changed(array)
             for watched, array in zip(self._watched, self._arrays(model), strict=True)
         )
 
     def _arrays(self, model: mujoco.MjModel) -> list[NDArray]:
-        """The arrays that say what the surface is."""
+        """The arrays that describe the surface."""
         geom = self._target
         if not is_geom(geom, model):
             return []
