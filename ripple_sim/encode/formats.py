@@ -22,6 +22,9 @@ from .webp import join_webp
 # Frames in a clip, which begins with a key frame. A killed render loses so many frames at most.
 FRAMES_IN_CLIP = 48
 
+# A segment that is being written: a clip, or an image.
+Segment: TypeAlias = Clip | SimpleNamespace
+
 # Files of segments, each with the number of its first frame.
 Segments = Sequence[tuple[Path, int]]
 
@@ -44,9 +47,6 @@ def _still(write: Callable[[NDArray], None]) -> SimpleNamespace:
 def _by_pillow(path: Path, **settings: Any) -> SimpleNamespace:
     """A segment of one frame, in an image file that Pillow writes with these settings."""
     return _still(lambda frame: Image.fromarray(frame).save(path, **settings))
-
-
-Segment: TypeAlias = Clip | SimpleNamespace
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""MaterialImages of a mesh's materials: decoded, with one line on those that are lost."""
+"""`MaterialImages`: the images of a mesh's materials, decoded, and a note on lost ones."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ripple_sim.solver.mesh.looks import ImageSource, Paint
 # First bytes of KTX2 files, whose images are compressed for graphics cards.
 _KTX2 = b"\xabKTX 20\xbb"
 
-# Names of lost images in a message, at most.
-_MOST_NAMES = 3
+# Largest number of lost images that a message names.
+_MAX_NAMES = 3
 
 
 def load_image(source: Any) -> NDArray[np.uint8]:
@@ -38,10 +38,10 @@ def image_pixels(image: ImageSource) -> NDArray[np.uint8]:
     source = image.source
     if isinstance(source, Path):
         try:
-            found = source.is_file()
+            exists = source.is_file()
         except (OSError, ValueError):  # a name that the system does not allow
-            found = False
-        if not found:
+            exists = False
+        if not exists:
             raise SceneError(f"{shown(image.name)} is missing")
         try:
             source = source.read_bytes()
@@ -54,7 +54,7 @@ def image_pixels(image: ImageSource) -> NDArray[np.uint8]:
 
 @dataclasses.dataclass
 class MaterialImages:
-    """Decodes the images of materials, each once, and keeps account of those that are lost."""
+    """Decodes the images of materials, each once, and records those that are lost."""
 
     _pixels: dict[ImageSource, NDArray[np.uint8] | None] = dataclasses.field(default_factory=dict)
     _lost: dict[str, str] = dataclasses.field(default_factory=dict)
@@ -80,6 +80,7 @@ class MaterialImages:
         return float(metallic), float(roughness)
 
     def _decoded(self, image: ImageSource | None) -> NDArray[np.uint8] | None:
+        """Pixels of an image; None without one, or if it is lost."""
         if image is None:
             return None
         self._names.add(image.name)
@@ -96,9 +97,10 @@ class MaterialImages:
         if not self._lost:
             return ()
         reasons = list(self._lost.values())
-        more = ", ..." if len(reasons) > _MOST_NAMES else ""
-        said = ", ".join(reasons[:_MOST_NAMES]) + more
+        listed = ", ".join(reasons[:_MAX_NAMES])
+        if len(reasons) > _MAX_NAMES:
+            listed += ", ..."
         count = len(self._names)
         noun = "image" if count == 1 else "images"
         verb = "is" if len(reasons) == 1 else "are"
-        return (f"{len(reasons)} of {count} {noun} {verb} not shown: {said}",)
+        return (f"{len(reasons)} of {count} {noun} {verb} not shown: {listed}",)

@@ -27,7 +27,7 @@ _PLAIN_RGBA = (0.5, 0.5, 0.5, 1.0)
 # Endings of the image NAME_texture beside a mesh file.
 _IMAGE_ENDINGS = (".png", ".jpg", ".jpeg")
 
-# MaterialImages that are scaled by less than this are told of.
+# Images that are scaled by less than this are noted.
 _NOTED_SCALE = 0.7
 
 

@@ -15,7 +15,7 @@ from ripple_sim.solver.errors import POSITIVE, Valid, check_fields, is_finite, w
 
 Backend = Literal["auto", "gl", "cpu"]
 
-# Checks that hold for every output. What an output or a scene allows is checked when it is known.
+# Checks that hold for every output and scene; further checks follow when these are known.
 IN_ANY_CASE = {
     "size": Valid(
         lambda size: min(size) > 0, "(width, height) in pixels, two whole numbers greater than 0"

@@ -54,9 +54,16 @@ from .settings import (
     settled,
 )
 
-_END: Any = object()  # marks the end of an iterator
+# An item of an iterable that runs ahead.
+Item = TypeVar("Item")
 
-# Shots that wait to be rendered; one would do if all frames took the same time.
+# Called with the number of frames done and of all frames.
+Progress = Callable[[int, int], None]
+
+# Marks the end of an iterator.
+_END: Any = object()
+
+# Number of shots that wait to be rendered; one would do if all frames took the same time.
 _WAITING_SHOTS = 2
 
 # Frames from one fingerprint of the simulation's state to the next. A render that is resumed
@@ -127,10 +134,12 @@ class Film:
         self._submitted: deque[Shot] = deque()
         self._marks: list[list[PlacedMark]] = []
         self._pass_files: PassFiles | None = None
-        # number and sighting of the latest frame, whose passes are not written yet
-        self._last_seen: tuple[int, Sighting] | None = None
+        # number and sighting of the latest frame: its passes are written with the next frame's
+        # sighting, to which its pixels flow
+        self._latest_sighting: tuple[int, Sighting] | None = None
 
     def _make_painter(self) -> Painter:
+        """The painter of the overlays."""
         operators = compared_operators(self._options.compare)
         ripples = self.simulations[0].ripples
         spacings = {grid_spacing(ripples[name].atlas.resolution) for name in ripples}
@@ -148,7 +157,7 @@ class Film:
         `frames` is the number of frames that the output has already.
         """
         model = self.simulations[0].model
-        # name of each number of the segmentation: of geoms, and of soft targets, which come after
+        # names of the numbers of the segmentation: those of geoms, then those of soft targets
         segments = {0: "background"}
         for geom in map(geom_id, range(model.ngeom)):
             segments[geom + 1] = geom_name(model, geom)
@@ -160,14 +169,14 @@ class Film:
         )
 
     def see(self, shot: Shot) -> None:
-        """Write the passes of a shot whose frame exists already, if its passes do not."""
+        """Write the passes of a shot whose frame exists already, if the passes do not exist."""
         if self._pass_files is None or shot.exposure > 0:
             return
         if shot.number < self._pass_files.complete:
             return
         self.prepare()
         start = work_clock()
-        self._see((shot.number, self._sources[0].sighting(shot.snapshots[0])))
+        self._take_sighting((shot.number, self._sources[0].sighting(shot.snapshots[0])))
         self.seconds += work_clock() - start
 
     def prepare(self) -> None:
@@ -212,7 +221,7 @@ class Film:
             frame = self.fetch()
             if frame is not None:
                 yield frame
-        self._see(None)
+        self._take_sighting(None)
 
     def submit(self, shot: Shot) -> None:
         """Draw an exposure without waiting for it: `fetch` returns shots in their order.
@@ -227,21 +236,21 @@ class Film:
                 self._set_heatmaps(run, shot.notes)
             source.submit(snapshot)
             if self._pass_files is not None and shot.exposure == 0:
-                self._see((shot.number, source.sighting(snapshot)))
+                self._take_sighting((shot.number, source.sighting(snapshot)))
         self._submitted.append(shot)
         self.seconds += work_clock() - start
 
-    def warn_of_unseen(self, whole: bool) -> None:
+    def warn_of_unseen(self, is_complete: bool) -> None:
         """Warn of waves that no frame shows, neither by their height nor by colours.
 
-        After a `whole` scene also warn of targets without any wave. A video with sound, and targets
-        whose scene asks for no warnings, may be for the ear.
+        After a complete scene also warn of targets without any wave. A video with sound, and
+        targets whose scene asks for no warnings, may be for the ear.
         """
         if not (self._request.heatmap or self._options.sound):
             targets = self.simulations[0].scene.targets
             silent = [entry.geom for entry in targets if not (entry.warn or entry.limit)]
             self._sources[0].shown.warn_of_low(silent)
-        if whole:
+        if is_complete:
             self._sources[0].shown.warn_of_none()
 
     def _set_heatmaps(self, run: int, notes: Notes) -> None:
@@ -251,22 +260,22 @@ class Film:
         for name, heatmap in notes.heatmaps[run].items():
             self._sources[run].renderer.set_heatmap(geoms[name], heatmap, limit)
 
-    def _see(self, seen: tuple[int, Sighting] | None) -> None:
-        """Write the passes of the frame before, whose pixels flow to the frame that is seen now.
+    def _take_sighting(self, numbered_sighting: tuple[int, Sighting] | None) -> None:
+        """Take the number and the sighting of a frame, and write the passes of the frame before.
 
-        `seen` is the number and the sighting of a frame; None after the last one.
+        None comes after the last frame.
         """
         if self._pass_files is None:
             return
-        if self._last_seen is None:
+        if self._latest_sighting is None:
             # not earlier: a render that fails before its first frame leaves all files as they were
             self._pass_files.begin()
         else:
-            number, sighting = self._last_seen
-            later = None if seen is None else seen[1]
+            number, sighting = self._latest_sighting
+            later = None if numbered_sighting is None else numbered_sighting[1]
             passes = passes_of(sighting, later, tuple(self._options.passes))
             self._pass_files.write(number, passes)
-        self._last_seen = seen
+        self._latest_sighting = numbered_sighting
 
     def fetch(self) -> NDArray | None:
         """Wait for the earliest shot; return a frame after its last exposure, else None."""
@@ -331,9 +340,6 @@ def open_video(
     )
 
 
-Item = TypeVar("Item")
-
-
 @contextlib.contextmanager
 def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
     """Run an iterable in a thread, at most `depth` items ahead.
@@ -367,8 +373,8 @@ class Summary:
     The frames before `resumed_at` existed already. `renderer` is the driver's GL_RENDERER,
     `backend` the backend of the wave solver. The times of the stages [s] add up to more than
     `wall_seconds`, because the stages overlap. `compile_seconds`, for kernels that are used for the
-    first time on a machine, is not part of the stages' times. `sound` says what a sample of the
-    sound is, and up to which frequency it is right, if there is a sound.
+    first time on a machine, is not part of the stages' times. If there is a sound, `sound` is the
+    unit of its samples, and the frequency up to which it is right.
     """
 
     output: Path
@@ -385,9 +391,6 @@ class Summary:
     encode_seconds: float
     wall_seconds: float
     sound: str = ""
-
-
-Progress = Callable[[int, int], None]
 
 
 @checked(
@@ -436,7 +439,7 @@ def render_video(
     """
     start = time.perf_counter()
     work_start = work_clock()
-    compiled = sum(compile_times().values())
+    compiled_before = sum(compile_times().values())  # [s]
     adopt_warnings()
     output = Path(output)
     options = settled(options, scene, output)
@@ -462,8 +465,8 @@ def render_video(
         if options.passes:
             film.write_passes(output, resumed_at)
         ready = _write_frames(film, writer, frames, gl, progress)
-        if not resumed_at:  # else it is not known what the frames before showed
-            film.warn_of_unseen(whole=(options.duration or 0.0) >= scene.duration)
+        if not resumed_at:  # the frames of an earlier render may have shown waves
+            film.warn_of_unseen(is_complete=(options.duration or 0.0) >= scene.duration)
         if microphone is not None:
             pressure = microphone.pressure(frames / options.rate)
             writer.sound = pressure * gain(pressure)
@@ -476,7 +479,7 @@ def render_video(
         renderer=gl.renderer,
         backend=simulations[0].backend,
         substeps_per_frame=substeps / max(writer.frames - 1, 1),
-        compile_seconds=sum(compile_times().values()) - compiled,
+        compile_seconds=sum(compile_times().values()) - compiled_before,
         setup_seconds=ready - work_start,
         physics_seconds=sum(simulation.physics_seconds for simulation in simulations),
         wave_seconds=sum(simulation.wave_seconds for simulation in simulations),

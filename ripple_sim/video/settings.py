@@ -74,9 +74,11 @@ def scene_digest(scene: Scene) -> str:
         (scene.targets, scene.camera, scene.events, scene.two_way, *sensors)
     )
     for path in itertools.chain.from_iterable(entry.files() for entry in scene.targets):
+        # the content of a file counts, and not its path
         entries = entries.replace(msgspec.json.encode(path), b'""')
         is_folder = Path(path).is_dir()
-        for file in sorted(Path(path).rglob("*")) if is_folder else [Path(path)]:
+        files = sorted(Path(path).rglob("*")) if is_folder else [Path(path)]
+        for file in files:
             if file.is_file():
                 hasher.update(file.read_bytes())
     hasher.update(entries)
@@ -99,7 +101,7 @@ def _add_fields(hasher: Any, struct: Any) -> None:
 
 
 def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
-    """The options with None and "auto" replaced, by what scene, output and machine call for.
+    """The options with values in place of None and "auto": those of the scene, output and machine.
 
     Shutter, aperture, focus and exposures stay as they are: see `with_exposure`. Raises
     `VideoError` for an output of unknown format.
@@ -194,6 +196,8 @@ def frame_count(options: SceneOptions, scene: Scene | None = None) -> int:
 
     Raises `SceneError` if the duration or the slow motion is out of range.
     """
-    duration = options.duration if scene is None or options.duration is not None else scene.duration
+    duration = options.duration
+    if duration is None and scene is not None:
+        duration = scene.duration
     check_duration(duration or 0.0, options.slow_motion)
     return max(1, round((duration or 0.0) * (options.fps or 0) * options.slow_motion))
