@@ -230,7 +230,8 @@ def _is_visible(
 ) -> NDArray[np.bool_]:
     """Whether points [k, 3] of the surface are visible from an eye; without one all are."""
     rays = np.zeros_like(points) if eye is None else eye - points
-    return scene.distances(points + np.array([0.0, 0.0, _RAY_OFFSET]), rays) > 1
+    distances = scene.distances(points + np.array([0.0, 0.0, _RAY_OFFSET]), rays)
+    return np.asarray(distances > 1)
 
 
 class RandomEntry(msgspec.Struct, forbid_unknown_fields=True):
