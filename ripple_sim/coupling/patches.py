@@ -96,7 +96,7 @@ def load_points(
     corner_distance = np.zeros(len(radii))  # the greatest of each patch [m]
     np.maximum.at(corner_distance, patches, distances[: len(points)])
     touch = distances[len(points) :] <= (corner_distance + radii / _TOUCH_DIVISOR)[pair_patches]
-    total = np.bincount(patches, forces)  # force of each patch [N]
+    total = np.bincount(patches, forces).astype(np.float64)  # force of each patch [N]
     shares = _shared_forces(patches, forces, total, np.column_stack([first, second]), touch)
     # a patch is filled if it has midpoints, and the surface is there at all of them
     is_filled = np.zeros(len(radii), np.bool_)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import mujoco
 
@@ -19,7 +19,7 @@ from .geoms import ByGeom, GeomKey, Value, by_name, find_target
 _MAPPINGS_END = "2.0"
 
 # A value for all targets. A mapping of values by geom is deprecated: `Target` takes its place.
-ForTargets = Value | ByGeom[Value]
+ForTargets: TypeAlias = Value | ByGeom[Value]
 
 # Fields that have no meaning for some targets: only hits with Hertz's pulse have a modulus.
 _OPTIONAL_FIELDS = ("modulus",)

@@ -222,7 +222,7 @@ def _has_room(
     for step in room * _DIRECTIONS:
         _, heights = downward_hits(scene, points[:, :2] + step, top)
         differences.append(heights - points[:, 2])
-    return (np.abs(differences) < room).all(axis=0)
+    return np.asarray((np.abs(differences) < room).all(axis=0))
 
 
 def _is_visible(
@@ -230,8 +230,7 @@ def _is_visible(
 ) -> NDArray[np.bool_]:
     """Whether points [k, 3] of the surface are visible from an eye; without one all are."""
     rays = np.zeros_like(points) if eye is None else eye - points
-    distances = scene.distances(points + np.array([0.0, 0.0, _RAY_OFFSET]), rays)
-    return np.asarray(distances > 1)
+    return scene.distances(points + np.array([0.0, 0.0, _RAY_OFFSET]), rays) > 1
 
 
 class RandomEntry(msgspec.Struct, forbid_unknown_fields=True):

@@ -57,7 +57,7 @@ def given_until_over(load: TargetLoad) -> float:
     """Impulse that is still given after the geoms have left [N s]."""
     total = 0.0
     for _ in range(5000):
-        present = load.given(DT)
+        present = load.over(DT)
         if not len(present.forces):
             return total
         total += present.forces.sum() * DT
@@ -101,7 +101,7 @@ def test_new_waves_on_the_same_atlas_get_the_outstanding_load() -> None:
             if step % 3:
                 load.touched(contacts_on(pose, {1: [(POLE, 3.0)]}), pose, DT, DT)
             else:
-                load.given(DT)
+                load.over(DT)
     changed.set_waves(WaveSolver(sphere_atlas(1.0, 16), Material(speed=3.0), backend="cpu"))
     deficit = given_until_over(kept)
     assert abs(deficit) > 1e-4
