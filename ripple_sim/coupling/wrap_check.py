@@ -43,9 +43,9 @@ class WrapCheck:
             others, _, forces, normals = contacts[target]
             owners = self._owners[others]
             for owner in np.unique(owners).tolist():
-                is_owned = owners == owner
-                amount = forces[is_owned].sum()
-                vector_sum = np.linalg.norm(forces[is_owned] @ normals[is_owned])
+                of_owner = owners == owner
+                amount = forces[of_owner].sum()
+                vector_sum = np.linalg.norm(forces[of_owner] @ normals[of_owner])
                 sums = self._sums.setdefault((target, owner), np.zeros(3))
                 sums += np.array([1.0, amount, vector_sum])
                 steps, pressing, moving = sums
