@@ -56,7 +56,8 @@ _OUTLIER_RATIO = 4.0
 
 # The memory grows by this share of the time that passes.
 _MEMORY_GROWTH = 0.4
-# The longest memory [s].
+# The longest memory [s]. With one of over 40 s the shares of a step of 2 ms would be lower than the
+# least share that the rest filter keeps.
 _LONGEST_MEMORY = 2.0
 # Averaging time of the latest place [s]. The mean place is averaged over twice this time at least,
 # and so over the onset.

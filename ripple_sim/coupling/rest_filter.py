@@ -79,7 +79,9 @@ class _Shares(NamedTuple):
     mean : float64 [k]
         Mean shares; those of a geom add up to 1.
     latest : float64 [k]
-        Shares in this step, or 0; later the forces on the texels [N].
+        Shares in this step, 0 for texels that the geom has left.
+    forces : float64 [k]
+        Filtered forces on the texels [N].
     slots : int64 [C n n]
         Where a texel of the present geom stands in the arrays above, or -1. It is -1 everywhere
         before and after a step, so that a step costs no more on a larger grid.
@@ -88,6 +90,7 @@ class _Shares(NamedTuple):
     texels: Ints
     mean: Floats
     latest: Floats
+    forces: Floats
     slots: Ints
 
 
@@ -151,6 +154,7 @@ class RestFilter:
             texels=np.empty(size, np.int64),
             mean=np.empty(size),
             latest=np.empty(size),
+            forces=np.empty(size),
             slots=self._slots,
         )
         count, self._all_gone = _filter(
@@ -158,7 +162,7 @@ class RestFilter:
         )
         self._texels = shares.texels[:count]
         self._mean_shares = shares.mean[:count]
-        return Load(self._texels, shares.latest[:count])
+        return Load(self._texels, shares.forces[:count])
 
     def _scale_times(self, dt: float) -> None:
         """Scale all times for a time step [s] and for the time constant of the contacts."""
@@ -184,13 +188,16 @@ def _filter(
     ----------
     states : CONTACT_STATE [c]
         Updated.
-    texels, mean_shares
-        Those of the step before.
+    texels : int64 [m]
+        Texels under all geoms in the step before.
+    mean_shares : float64 [m]
+        Their mean shares.
     present : TexelForces
+        The contact forces of this step.
     dt : float
         Time step [s].
     out : _Shares
-        Filled in, with the forces on the texels [N] as `latest`.
+        Filled in.
     """
     end = 0
     row = 0
@@ -198,7 +205,9 @@ def _filter(
     for geom in range(len(states)):
         state = states[geom]
         begin = end
-        first = last = 0
+        # the rows of the geom's texels in `present`
+        first = 0
+        last = 0
         if row < len(present.geoms) and present.geoms[row] == geom:
             first = present.begins[row]
             last = present.begins[row + 1]
@@ -210,26 +219,29 @@ def _filter(
             side = 1.0 if force > 0 else -1.0
             turn(state, side)
             point = present.middles[row - 1]
-            total = side * touch(state, abs(force), point, present.place_radii[row - 1], dt)
+            force_amount = touch(state, abs(force), point, present.place_radii[row - 1], dt)
+            # weight of this step in the mean shares
             weight = dt / (dt + state.memory) if state.first < state.last else 1.0
             if weight < 1:
                 end = _fade(state, texels, mean_shares, 1 - weight, out, end)
             end = _add_shares(present, first, last, force, weight, out, end)
             state.active = True
-            averaged = side * min(state.mean_force, side * total)
+            filtered_force = side * force_amount
+            steady_force = side * min(state.mean_force, force_amount)
         elif state.active:
-            total = state.side * miss(state, dt)
-            averaged = total
+            filtered_force = state.side * miss(state, dt)
+            steady_force = filtered_force
             end = _keep(state, texels, mean_shares, out, end)
         else:
             continue
         all_gone = all_gone and not state.active
         state.first = begin
         state.last = end
-        # the steady part of the force lies at the mean place, the rest where the geom touches now
+        # the steady part of the force acts at the mean place, the rest where the geom touches now
+        other_force = filtered_force - steady_force
         for i in range(begin, end):
             out.slots[out.texels[i]] = -1
-            out.latest[i] = averaged * out.mean[i] + (total - averaged) * out.latest[i]
+            out.forces[i] = steady_force * out.mean[i] + other_force * out.latest[i]
     return end, all_gone
 
 
