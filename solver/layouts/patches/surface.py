@@ -241,11 +241,15 @@ def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat,
     list of int64 [l]
         The vertices along each line, from start to end.
     """
-    has_line = start[flat.part] >= 0
-    cut, origin, paths = _cut_all(_subset(flat, has_line), start, end, on_border)
-    stays_whole = np.bincount(origin, minlength=int(has_line.sum())) == 1
-    is_whole = ~has_line
-    is_whole[np.flatnonzero(has_line)[stays_whole]] = True
+    has_line = np.flatnonzero(start[flat.part] >= 0)
+    line = _line_coordinates(_subset(flat, has_line), start, end, on_border)
+    is_near = _is_near(line)
+    near = has_line[is_near]
+    coordinates = _LineCoordinates._make(array[is_near] for array in line)
+    cut, origin, paths = _cut_all(_subset(flat, near), coordinates, len(start))
+    stays_whole = np.bincount(origin, minlength=len(near)) == 1
+    is_whole = np.ones(len(flat.part), bool)
+    is_whole[near[~stays_whole]] = False
     whole = _subset(flat, is_whole)
     pieces = _subset(cut, ~stays_whole[origin])
     surface = TriangleSurface(
@@ -259,7 +263,7 @@ def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat,
     return Flat(surface, part, places), paths
 
 
-def _subset(flat: Flat, chosen: Bools) -> Flat:
+def _subset(flat: Flat, chosen: Bools | Ints) -> Flat:
     """Some of the triangles, with the vertices of all."""
     surface = flat.surface
     some = TriangleSurface(
@@ -284,13 +288,19 @@ class _Crossings(NamedTuple):
     along: Floats  # distance of that point from the line's start, [e]
 
 
-def _cut_all(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat, Ints, list[Ints]]:
-    """Cut polygons that all have a line; see `cut_ray`.
+def _is_near(line: _LineCoordinates) -> Bools:
+    """Triangles that their line may cut, [m]: with corners on both sides of it, or on it."""
+    lies_across = (line.beside.min(axis=1) < 0) & (line.beside.max(axis=1) > 0)
+    lies_after_start = line.along.max(axis=1) > 0
+    return (lies_across & lies_after_start) | line.on_line.any(axis=1)
+
+
+def _cut_all(flat: Flat, line: _LineCoordinates, count: int) -> tuple[Flat, Ints, list[Ints]]:
+    """Cut the triangles near the lines of a number of polygons; see `cut_ray`.
 
     Returns the triangle from before in which each triangle lies, too.
     """
     surface = flat.surface
-    line = _line_coordinates(flat, start, end, on_border)
     crossings = _crossings(flat, line)
     finer, middles, origin, weights = surface.subdivided(crossings.places)
     triangle, corner = np.nonzero(line.on_line)
@@ -306,7 +316,7 @@ def _cut_all(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat
         ]
     )
     points = np.concatenate([at_vertices, on_edges], axis=1)
-    paths = _paths(points, len(start))
+    paths = _paths(points, count)
     places = weights @ flat.places[origin]
     return Flat(finer, flat.part[origin], places), origin, paths
 
