@@ -8,7 +8,7 @@ whatever the weights; mean-value weights follow the shape of the triangles.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import splu
 
@@ -218,17 +218,27 @@ def along(V: Floats, paths: list[Ints]) -> Floats:
 def _solved(corners: Ints, weights: Floats, start: Floats) -> Floats:
     """Places [n, 2] of all vertices; places that are NaN in `start` are computed."""
     free = np.isnan(start[:, 0])
+    count = int(free.sum())
+    number = np.cumsum(free) - 1
     row = np.repeat(corners, 2, axis=1).ravel()
     column = np.stack([np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)], axis=2).ravel()
     chosen = free[row]
-    matrix = csr_array(
-        (weights.ravel()[chosen], (row[chosen], column[chosen])), shape=(len(start), len(start))
-    )
-    total = np.asarray(matrix.sum(axis=1))
-    rows = matrix[free]
-    rows.data /= np.repeat(total[free], np.diff(rows.indptr))
-    system = csc_array(-rows[:, free])
-    system.setdiag(1.0)
+    row = row[chosen]
+    column = column[chosen]
+    weight = weights.ravel()[chosen]
+    weight /= np.bincount(row, weight, len(start))[row]
+    is_inner = free[column]
+    # each vertex less the mean of its free neighbours is the share of those on the border
+    every = np.arange(count)
+    entries = np.concatenate([np.ones(count), -weight[is_inner]])
+    rows = np.concatenate([every, number[row[is_inner]]])
+    columns = np.concatenate([every, number[column[is_inner]]])
+    system = coo_array((entries, (rows, columns)), shape=(count, count)).tocsc()
+    at_border = number[row[~is_inner]]
+    share = weight[~is_inner, None] * start[column[~is_inner]]
+    known = np.stack([np.bincount(at_border, share[:, k], count) for k in range(2)], axis=1)
     places = start.copy()
-    places[free] = splu(system).solve(rows[:, ~free] @ start[~free])
+    # the matrix has a symmetric pattern and a dominant diagonal: it needs no pivots
+    factors = splu(system, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    places[free] = factors.solve(known)
     return places

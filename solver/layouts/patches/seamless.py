@@ -240,10 +240,16 @@ def _connect(seamless: SeamlessMap, twin: Ints, places: Complex) -> None:
 
 
 @kernel
+def _lies_inside(z: complex) -> bool:
+    """Whether a place lies in its chart."""
+    return 0.0 <= z.real <= 1.0 and 0.0 <= z.imag <= 1.0
+
+
+@kernel
 def rehome(seamless: SeamlessMap, before: Complex) -> None:
     """Follow each vertex straight from where it was [n], over the borders of charts."""
     for v in range(len(seamless.z)):
-        if seamless.freedom[v] != FIXED:
+        if seamless.freedom[v] != FIXED and not _lies_inside(seamless.z[v]):
             rehome_vertex(seamless, v, before[v])
 
 
@@ -251,7 +257,7 @@ def rehome(seamless: SeamlessMap, before: Complex) -> None:
 def rehome_vertex(seamless: SeamlessMap, v: int, p: complex) -> None:
     """Follow one vertex from p, in its chart."""
     q = seamless.z[v]
-    if 0.0 <= q.real <= 1.0 and 0.0 <= q.imag <= 1.0:
+    if _lies_inside(q):
         return
     seamless.chart[v], change, seamless.z[v] = follow(seamless, seamless.chart[v], p, q)
     if change[0] % 2 == 1 and seamless.freedom[v] != FREE:
