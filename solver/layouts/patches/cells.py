@@ -45,8 +45,9 @@ _MIN_EDGE_SHARE = 0.1
 # Angle at the rim below which a cell gets a corner there [rad].
 _MAX_CORNER_ANGLE = np.radians(125)
 
-# Places on a surface at which the size of cells is judged.
-_SIZE_SAMPLES = 500
+# Places on a surface at which the size of cells is judged, at most, and for each cell.
+_MAX_SIZE_SAMPLES = 500
+_SIZE_SAMPLES_PER_CELL = 40
 
 # Area of a geodesic disk over the area of a flat one, below which the disk counts as wrapped.
 _MIN_DISK_AREA = 0.5
@@ -329,15 +330,17 @@ def _arcs(V: Floats, loop: Ints, corner: Bools, on_rim: Bools) -> list[Ints]:
     return [turned[start : end + 1] for start, end in zip([0, *ends[:-1]], ends, strict=True)]
 
 
-def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> Floats:
-    """Radius of the cells round each vertex [m], [n], between a least and a largest one.
+def cell_sizes(
+    metric: Metric, reach: float, between: tuple[float, float], cell_count: int
+) -> Floats:
+    """Radius of about `cell_count` cells round each vertex [m], [n], between two bounds.
 
     A cell has at most the share `reach` of the radius at which a geodesic disk round its middle has
     much less area than a flat one, being wrapped round a limb (of a tube that radius is nearly the
     girth) or over its end. The metric must be in metres.
     """
     total = np.cumsum(metric.masses)
-    count = min(_SIZE_SAMPLES, len(total))
+    count = min(_MAX_SIZE_SAMPLES, _SIZE_SAMPLES_PER_CELL * cell_count, len(total))
     seeds = np.unique(np.searchsorted(total, (np.arange(count) + 0.5) / count * total[-1]))
     cells = voronoi_cells(metric, np.minimum(seeds, len(total) - 1))
     # from seed to seed, by the shortest way along an edge between neighbouring cells

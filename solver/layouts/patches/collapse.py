@@ -35,7 +35,7 @@ from .surface import TriangleSurface
 # Double area over squared longest side of a triangle on the charts after a collapse, at least.
 # Where a triangle is flatter already, such as a piece of a needle, the collapse must make no
 # triangle flatter than that one.
-_MIN_FLATNESS = 0.05
+_MIN_FLATNESS = 0.02
 
 # Double area of a triangle in its parent, in barycentric coordinates, at least.
 _MIN_AREA_IN_PARENT = 1e-9
@@ -157,13 +157,14 @@ def _find_targets(
         # inside the surface each neighbour is the next corner of one triangle; at a rim the last
         # neighbour is not
         corners_to_try = 1 if seamless.freedom[u] == FREE else 2
+        least_flatness = min(_MIN_FLATNESS, _flattest_in_star(seamless, u))
         for i in range(start, end):
             f = seamless.star[i] // 3
             k = seamless.star[i] % 3
             for j in range(1, 1 + corners_to_try):
                 m = (k + j) % 3
                 v = seamless.F[f, m]
-                width = _worth(seamless, parents, at_rim, u, f, k, m)
+                width = _worth(seamless, parents, at_rim, u, f, k, m, least_flatness)
                 if width > worth[u] and _meets_link_condition(seamless, u, v, mark):
                     worth[u] = width
                     target[u] = 3 * f + m
@@ -217,12 +218,29 @@ def _meets_link_condition(seamless: SeamlessMap, u: int, v: int, mark: Ints) -> 
 
 
 @kernel
+def _flattest_in_star(seamless: SeamlessMap, u: int) -> float:
+    """Flatness of the flattest triangle round a vertex on the charts."""
+    flattest = np.inf
+    for i in range(seamless.star_start[u], seamless.star_start[u + 1]):
+        flattest = min(flattest, _flatness(seamless, seamless.star[i] // 3))
+    return flattest
+
+
+@kernel
 def _worth(
-    seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: int, k: int, m: int
+    seamless: SeamlessMap,
+    parents: Parents,
+    at_rim: Bools,
+    u: int,
+    f: int,
+    k: int,
+    m: int,
+    least_flatness: float,
 ) -> float:
     """Flatness of the flattest triangle on the charts if u moves to v; 0 if it must not.
 
-    u is corner k of triangle f, and v its corner m. All places are in the frame of u.
+    u is corner k of triangle f, and v its corner m. All places are in the frame of u. It must not
+    if a triangle would be as flat as `least_flatness` or flatter.
     """
     v = seamless.F[f, m]
     v_is_tip = seamless.freedom[v] == FIXED
@@ -230,11 +248,9 @@ def _worth(
         return 0.0  # the frames round a corner of a rim stay as they are
     goal = place_seen_from(seamless, f, k, m)
     flattest_after = np.inf
-    flattest_before = np.inf
     for i in range(seamless.star_start[u], seamless.star_start[u + 1]):
         g = seamless.star[i] // 3
         c = seamless.star[i] % 3
-        flattest_before = min(flattest_before, _flatness(seamless, g))
         p = (c + 1) % 3
         q = (c + 2) % 3
         a = seamless.F[g, p]
@@ -250,8 +266,7 @@ def _worth(
         to_b = place_seen_from(seamless, g, c, q) - goal
         longest_squared = max(square(to_a), square(to_b), square(to_a - to_b))
         flattest_after = min(flattest_after, wedge(to_a, to_b) / longest_squared)
-    is_thick_enough = flattest_after > min(_MIN_FLATNESS, flattest_before)
-    return flattest_after if is_thick_enough else 0.0
+    return flattest_after if flattest_after > least_flatness else 0.0
 
 
 @kernel

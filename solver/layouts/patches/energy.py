@@ -83,6 +83,20 @@ _MAX_SHARE_OF_FOLD = 0.9
 # Sweeps over single vertices before the Newton steps.
 _SWEEPS_BEFORE_NEWTON = 2
 
+# Energy of a triangle over its reference area above which it is strained: 1 is an isometry. Where
+# cones and holes stand close together no map is better, so it counts as no more for the progress.
+_STRAINED = 100.0
+
+# Spots that are strained most are eased together with those of more than this share of their
+# energy over area.
+_EASED_TOGETHER = 1e-3
+
+# Rounds that ease spots, at most, the sweeps of each, and the share of the spots' energy that each
+# round must save.
+_MAX_EASING_ROUNDS = 25
+_SWEEPS_OF_EASING = 4
+_MIN_EASING = 0.2
+
 # Newton steps of a relaxation, at most.
 _MAX_NEWTON_STEPS = 30
 
@@ -145,24 +159,32 @@ def total_energy(seamless: SeamlessMap, reference: Reference) -> float:
 def energy_of(seamless: SeamlessMap, reference: Reference, triangles: Ints) -> float:
     """Energy of some triangles [k]; infinite if one of them is folded."""
     total = 0.0
-    cotangent = reference.cotangent
     for f in triangles:
-        a = corner_place(seamless, f, 0)
-        b = corner_place(seamless, f, 1)
-        c = corner_place(seamless, f, 2)
-        area = 0.5 * wedge(b - a, c - a)
-        if not area > _MIN_AREA:
+        density = _density_at(seamless, reference, f)
+        if not density < np.inf:
             return np.inf
-        first = 3 * f
-        dirichlet = (
-            cotangent[first] * square(c - b)
-            + cotangent[first + 1] * square(c - a)
-            + cotangent[first + 2] * square(b - a)
-        )
-        reference_area = reference.area[f]
-        inverse_jacobian = reference_area / area
-        total += reference_area * energy_density(dirichlet, inverse_jacobian, reference.density)
+        total += reference.area[f] * density
     return total
+
+
+# inlined: handing over a map takes longer than the work
+@kernel(inline="always")
+def _density_at(seamless: SeamlessMap, reference: Reference, f: int) -> float:
+    """Energy of a triangle over its reference area; infinite if it is folded."""
+    cotangent = reference.cotangent
+    a = corner_place(seamless, f, 0)
+    b = corner_place(seamless, f, 1)
+    c = corner_place(seamless, f, 2)
+    area = 0.5 * wedge(b - a, c - a)
+    if not area > _MIN_AREA:
+        return np.inf
+    first = 3 * f
+    dirichlet = (
+        cotangent[first] * square(c - b)
+        + cotangent[first + 1] * square(c - a)
+        + cotangent[first + 2] * square(b - a)
+    )
+    return energy_density(dirichlet, reference.area[f] / area, reference.density)
 
 
 @kernel
@@ -335,19 +357,73 @@ def sweep_all(seamless: SeamlessMap, reference: Reference, backwards: bool) -> f
 def relax_all(seamless: SeamlessMap, reference: Reference, least_gain: float) -> None:
     """Lower the energy of a map in place: sweeps first, then Newton steps.
 
-    The steps end when one saves less than the share `least_gain` of the energy.
+    The steps end when one saves less than the share `least_gain` of the energy. For this a triangle
+    counts as strained by `_STRAINED` at most.
     """
     edges = edges_of(seamless.F)
     ends = edges.ends.astype(np.int32)
+    triangles = np.arange(len(seamless.F))
+
+    def energy() -> float:
+        return _capped_energy(seamless, reference, triangles, _STRAINED)
+
+    def step_all(cg_steps: int) -> tuple[float, float]:
+        before = energy()
+        _, step = newton_step(seamless, reference, edges.of_side, ends, cg_steps)
+        return before - energy(), step
+
+    def sweep_once(backwards: bool) -> float:
+        before = energy()
+        sweep_all(seamless, reference, backwards)
+        return before - energy()
+
     for i in range(_SWEEPS_BEFORE_NEWTON):
         sweep_all(seamless, reference, i % 2 == 0)
-    descend_by_newton(
-        lambda cg_steps: newton_step(seamless, reference, edges.of_side, ends, cg_steps),
-        lambda backwards: sweep_all(seamless, reference, backwards),
-        lambda: total_energy(seamless, reference),
-        (least_gain, 1, _MAX_NEWTON_STEPS),
-        _CG_RANGE,
-    )
+    _ease(seamless, reference)
+    stop = (least_gain, 1, _MAX_NEWTON_STEPS)
+    descend_by_newton(step_all, sweep_once, energy, stop, _CG_RANGE)
+
+
+def _ease(seamless: SeamlessMap, reference: Reference) -> None:
+    """Sweep over the spots where the map is strained most, until that gains little.
+
+    Newton steps of the whole map would be cut short there, and most of their work wasted.
+    """
+    buffers = star_buffers(seamless)
+    for _ in range(_MAX_EASING_ROUNDS):
+        densities = _densities(seamless, reference)
+        highest = densities.max(where=densities < np.inf, initial=0.0)
+        triangles = np.flatnonzero(densities > max(_STRAINED, _EASED_TOGETHER * highest))
+        if not len(triangles):
+            break
+        vertices = np.unique(seamless.F[triangles])
+        energy = _capped_energy(seamless, reference, triangles, highest)
+        for _ in range(_SWEEPS_OF_EASING):
+            vertices = vertices[::-1].copy()
+            sweep(seamless, reference, vertices, buffers, True)
+        lower = _capped_energy(seamless, reference, triangles, highest)
+        if lower > (1 - _MIN_EASING) * energy:
+            break
+
+
+@kernel
+def _densities(seamless: SeamlessMap, reference: Reference) -> Floats:
+    """Energy of each triangle over its reference area, [m]."""
+    densities = np.empty(len(seamless.F))
+    for f in range(len(densities)):
+        densities[f] = _density_at(seamless, reference, f)
+    return densities
+
+
+@kernel
+def _capped_energy(
+    seamless: SeamlessMap, reference: Reference, triangles: Ints, highest: float
+) -> float:
+    """Energy of some triangles [k], each with a density of at most `highest`."""
+    total = 0.0
+    for f in triangles:
+        total += reference.area[f] * min(_density_at(seamless, reference, f), highest)
+    return total
 
 
 def newton_step(

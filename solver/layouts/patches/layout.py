@@ -91,7 +91,7 @@ _MAX_CHART_ERROR_OF_MANY = 0.5
 _MAX_CROWDING = 4
 
 # Times that a part is cut again, at most.
-_MAX_RECUTS = 3
+_MAX_RECUTS = 2
 
 # Relaxation before the tips move ends when a step saves less than this share of the energy.
 _SAVING_BEFORE_TIPS = 5e-3
@@ -550,7 +550,7 @@ def _recut(
     for _ in range(_MAX_RECUTS):
         charts = len(latest.glued)
         previous_count = count
-        count = max(1, round(count * float(np.sqrt(wanted_charts / charts))))
+        count = max(1, round(count * wanted_charts / charts))
         if abs(charts / wanted_charts - 1) < tolerance or count == previous_count:
             break
         try:

@@ -513,7 +513,8 @@ def _cells_of(part: TriangleSurface, count: int) -> BorderedCells:
     reach = np.inf  # a single cell covers all
     if count > 1:
         largest = _LARGEST_RADIUS * np.sqrt(area / count)  # [m]
-        sizes = cell_sizes(metric, _LIMB_SHARE, (_SMALLEST_SHARE * largest, largest))
+        bounds = _SMALLEST_SHARE * largest, largest
+        sizes = cell_sizes(metric, _LIMB_SHARE, bounds, count)
         metric = metric.in_units(sizes)
         reach = 1.0
     return disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach)))

@@ -17,7 +17,7 @@ from ripple_sim.solver.mesh import edges_of
 
 def test_sizes_keep_to_their_bounds() -> None:
     ball = sphere(3)
-    sizes = patches.cell_sizes(Metric.of(TriangleSurface.of(ball.V, ball.F)), 0.5, (0.2, 0.3))
+    sizes = patches.cell_sizes(Metric.of(TriangleSurface.of(ball.V, ball.F)), 0.5, (0.2, 0.3), 96)
     assert sizes.min() >= 0.2
     assert sizes.max() <= 0.3 + 1e-12
 
