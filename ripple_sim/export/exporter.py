@@ -25,6 +25,7 @@ from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
 from ripple_sim.video.settings import frame_count, origin
 
+from .colors import colors_by_name
 from .options import HEIGHT_COLORS, MOST_TRIANGLES, ExportOptions
 from .place import Unfinished, check_export, check_mesh_format, check_options, check_written
 from .source import Source
@@ -56,6 +57,9 @@ class Exporter:
     looks : mapping, optional
         Geom, by its name or id, to the look of its surface, one of `LOOKS`; rubber by default, see
         `RippleRenderer`.
+    colors : mapping, optional
+        Geom, by its name or id, to the colour of its surface, sRGB from 0 to 1, instead of that of
+        the model or the look.
     lighting : str
         "model", "studio" or "auto", see `Renderer`.
     tessellation : str
@@ -109,6 +113,7 @@ class Exporter:
         fps: float = 60,
         camera: str | CameraEntry | None = None,
         looks: ByGeom[str] | None = None,
+        colors: ByGeom[tuple[float, float, float]] | None = None,
         lighting: str = "auto",
         tessellation: str = "refined",
         triangles: int = MOST_TRIANGLES,
@@ -128,6 +133,7 @@ class Exporter:
             fps=fps,
             camera=camera,
             looks=looks,
+            colors=colors,
             lighting=lighting,
             size=size,
             limit=limit,
@@ -268,6 +274,7 @@ def loop_source(
     *,
     camera: str | CameraEntry | None,
     looks: ByGeom[str] | None,
+    colors: ByGeom[tuple[float, float, float]] | None = None,
     limit: bool = True,
     **settings: Any,
 ) -> Source:
@@ -284,6 +291,9 @@ def loop_source(
     paints = {
         name: paint_of(model, geom, named.get(name)) for name, geom in ripples.geom_ids.items()
     }
+    for name, color in colors_by_name(model, colors).items():
+        look, _ = paints[name]
+        paints[name] = look, color
     return Source(
         model=model,
         ripples=ripples,

@@ -33,6 +33,7 @@ from ripple_sim.scene.camera_entry import CameraEntry
 from ripple_sim.solver.errors import GLError, checked, instance, warn_caller, whole
 from ripple_sim.solver.gl import GLContext, shared_context
 
+from .colors import colors_by_name
 from .exporter import Exporter, camera_entry, framed
 
 AnyCamera: TypeAlias = Camera | FixedCamera | str | int | mujoco.MjvCamera
@@ -79,6 +80,9 @@ class RippleRenderer:
         jelly, clay and so on. Its colour is the geom's, where the model gives it a texture or a
         colour, as in a scene file; one without either is grey, as in MuJoCo, unless it is named
         here.
+    colors : mapping
+        Geom, by its name or id, to the colour of its surface, sRGB from 0 to 1, instead of that of
+        the model or the look.
     gl : GLContext, optional
         By default the process's shared one.
     limit : bool
@@ -125,6 +129,7 @@ class RippleRenderer:
         font_scale: mujoco.mjtFontScale = mujoco.mjtFontScale.mjFONTSCALE_150,
         *,
         looks: ByGeom[str] | None = None,
+        colors: ByGeom[tuple[float, float, float]] | None = None,
         gl: GLContext | None = None,
         limit: bool = True,
         lighting: str = "model",
@@ -137,6 +142,7 @@ class RippleRenderer:
         self.height = int(height)
         self.width = int(width)
         self._looks = named
+        self._colors = colors_by_name(self.model, colors)
         self._limit = limit
         self._lighting = lighting
         self.scene = mujoco.MjvScene(self.model, max_geom)
@@ -330,11 +336,13 @@ class RippleRenderer:
         """A renderer for the targets' surfaces as they are now."""
         ripples = self._ripples
         looks = self._looks
+        colors = self._colors
         self._atlases = {name: ripples[name].rest for name in ripples}
         self._height_maps = {name: drawn_heights(ripples, name, self._limit) for name in ripples}
         surfaces = {
             geom: dataclasses.replace(
-                surface_of(ripples[name], looks.get(name, "rubber")), grey=name not in looks
+                surface_of(ripples[name], looks.get(name, "rubber"), colors.get(name)),
+                grey=name not in looks,
             )
             for name, geom in ripples.geom_ids.items()
         }
@@ -456,6 +464,7 @@ class RippleRenderer:
                 page,
                 camera=camera,
                 looks=self._looks,
+                colors=self._colors,
                 size=size,
                 limit=self._limit,
                 lighting=self._lighting,

@@ -245,13 +245,16 @@ class PageView:
         simulation = self.session.simulation
         if self._renderer is None:
             width, height = _RECORDED_SIZE
-            looks = {name: look for name, (look, _) in self._source.paints.items()}
+            paints = self._source.paints
+            looks = {name: look for name, (look, _) in paints.items()}
+            colors = {name: color for name, (_, color) in paints.items() if color is not None}
             self._renderer = RippleRenderer(
                 simulation.model,
                 simulation.ripples,
                 height,
                 width,
                 looks=looks,
+                colors=colors,
                 lighting=self._source.lighting,
             )
         self._renderer.update_scene(simulation.data, camera=self._camera)

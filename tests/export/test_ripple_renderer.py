@@ -509,3 +509,9 @@ def test_a_visual_mesh_ripples_and_is_drawn_while_its_collider_is_hidden():
     assert np.abs(ripples["link/0"].height).max() > 3e-4
     assert 2 in seen[0] - seen[1]
     assert {0, 1} <= seen[1]
+
+
+def test_a_colour_that_is_none_is_refused(ripples: Ripples) -> None:
+    for color in [(0.1, 0.2), (0.0, 0.0, 255.0), "red"]:
+        with pytest.raises(RippleError, match="colour of 'egg' must be three numbers from 0 to 1"):
+            RippleRenderer(ripples.model, ripples, colors={"egg": color})

@@ -1,5 +1,6 @@
 """The viewer's page in a headless browser: its waves are those of the program, and it drives it."""
 
+import dataclasses
 import json
 import re
 import time
@@ -7,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -285,6 +287,21 @@ def test_materials_and_looks_are_chosen_by_target(tmp_path: Path) -> None:
     view._change_look(Command("look", target=ALL_TARGETS, name=""))
     parts = json.loads(re.search(r'id="meta">(.*)</script>', view.pages.open().text)[1])["parts"]
     assert [part["metallic"] for part in parts if part["target"]] == [0, 0]
+    view.close()
+
+
+def test_a_recording_has_the_colours_of_the_targets(tmp_path: Path, opengl: None) -> None:
+    """Those of the scene, and of a look that the user has chosen."""
+    scene = open_scene("sphere")
+    entry = msgspec.structs.replace(scene.targets[0], color=(0.9, 0.05, 0.05))
+    red = dataclasses.replace(scene, targets=(entry,))
+    view = view_of(Session(red, resolution=9, has_skins=False), tmp_path, 8)
+    for look in ("", "metal"):
+        view._change_look(Command("look", name=look))
+        picture = view._picture().astype(int)
+        middle = picture[300:420, 580:700].mean(axis=(0, 1))
+        assert middle[0] > 1.5 * middle[1]
+        assert middle[0] > 1.5 * middle[2]
     view.close()
 
 
