@@ -2,7 +2,7 @@
 
 import csv
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,6 +12,23 @@ from ripple_sim import Exporter, Material, Ripples
 
 FRAMES = 20  # more than one chunk
 HEADER = "frame,time [s],geom,other,x [m],y [m],z [m],impulse [N s],chart,row,column,inner"
+
+
+class Hit(NamedTuple):
+    """A row of a table of impulses."""
+
+    frame: int
+    other: str
+    impulse: float  # [N s]
+    x: float  # [m]
+    y: float
+    z: float
+
+    @classmethod
+    def of(cls, row: dict[str, Any], length: str = "", impulse: str = "") -> "Hit":
+        """The hit of a row whose columns are named with these units."""
+        point = [float(row[axis + length]) for axis in "xyz"]
+        return cls(int(row["frame"]), row["other"], float(row["impulse" + impulse]), *point)
 
 
 def run(ripples: Ripples, path: Path, **options: Any) -> list[dict[str, Any]]:
@@ -51,9 +68,8 @@ def test_xarray_opens_a_run_in_one_line_with_units_and_coordinates(
     assert fields.position.sel(body="stone", axis="z")[-1] == seen[-1]["position"][2, 2]
     assert fields.velocity_egg.attrs["units"] == "m/s"
     assert np.array_equal(fields.x_egg, ripples["egg"].atlas.positions[..., 0])
-    assert np.array_equal(
-        fields.impulse_impulse, [hit.impulse for each in seen for hit in each["impulses"]]
-    )
+    impulses = [hit.impulse for each in seen for hit in each["impulses"]]
+    assert np.array_equal(fields.impulse_impulse, impulses)
     assert fields.sizes["impulse"] > 0
 
 
@@ -87,18 +103,17 @@ def test_texels_of_a_surface_that_moves_have_their_places_over_time(
 def test_a_table_has_a_row_for_each_impulse(ripples: Ripples, tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     seen = run(ripples, path)
-    expected = [(frame, hit) for frame, each in enumerate(seen) for hit in each["impulses"]]
+    expected = []
+    for frame, each in enumerate(seen):
+        expected += [Hit(frame, hit.other, hit.impulse, *hit.point) for hit in each["impulses"]]
     assert expected
     if path.suffix == ".csv":
-        header, *found = csv.reader(path.open())
-        assert ",".join(header) == HEADER
-        rows = [(int(row[0]), row[3], float(row[7]), [float(x) for x in row[4:7]]) for row in found]
+        with path.open() as file:
+            rows = csv.DictReader(file)
+            hits = [Hit.of(row, length=" [m]", impulse=" [N s]") for row in rows]
+        assert ",".join(rows.fieldnames) == HEADER
     else:
         table = pytest.importorskip("pyarrow.parquet").read_table(path)
         assert table.schema.field("impulse").metadata[b"unit"] == b"N s"
-        found = table.to_pylist()
-        rows = [
-            (row["frame"], row["other"], row["impulse"], [row[axis] for axis in "xyz"])
-            for row in found
-        ]
-    assert rows == [(frame, hit.other, hit.impulse, list(hit.point)) for frame, hit in expected]
+        hits = [Hit.of(row) for row in table.to_pylist()]
+    assert hits == expected

@@ -62,6 +62,12 @@ def quadrics_of(V, F):
     )
 
 
+def quadratic_form(quadric: np.ndarray) -> np.ndarray:
+    """The symmetric matrix [4, 4] of (x, y, z, 1), whose ten numbers a quadric has."""
+    xx, xy, xz, yy, yz, zz, x, y, z, constant = quadric
+    return np.array([[xx, xy, xz, x], [xy, yy, yz, y], [xz, yz, zz, z], [x, y, z, constant]])
+
+
 def test_quadric_error_is_the_sum_of_squared_distances_weighted_by_area():
     V, F = crumpled()
     quadrics = quadrics_of(V, F)
@@ -73,14 +79,9 @@ def test_quadric_error_is_the_sum_of_squared_distances_weighted_by_area():
             normal = np.cross(b - a, c - a)
             twice_area = np.linalg.norm(normal)
             total += twice_area / 2 * (normal / twice_area @ (p - a)) ** 2
-        q = quadrics[v]  # a form of (x, y, z, 1)
-        rows = (
-            [q[0], q[1], q[2], q[6]],
-            [q[1], q[3], q[4], q[7]],
-            [q[2], q[4], q[5], q[8]],
-            [*q[6:9], q[9]],
-        )
-        assert np.append(p, 1) @ np.array(rows) @ np.append(p, 1) == pytest.approx(total, rel=1e-10)
+        homogeneous = np.append(p, 1)
+        error = homogeneous @ quadratic_form(quadrics[v]) @ homogeneous
+        assert error == pytest.approx(total, rel=1e-10)  # round-off
 
 
 @pytest.mark.parametrize("third", [[2.0, 0, 0], [0.0, 0, 0]], ids=["in line", "a point twice"])
