@@ -80,33 +80,39 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
     """Let a mesh geom collide as its true surface.
 
     Primitive geoms do so by themselves and are left as they are. For them and for hulls MuJoCo's
-    speculative contacts are enabled where the version has them (from 4 on): fast geoms are then
-    stopped in time. SDF geoms have none.
+    speculative contacts are enabled if the version has them (from 4 on), so that fast geoms are
+    stopped in time. SDF geoms have no speculative contacts.
 
     Parameters
     ----------
     spec : mujoco.MjSpec
-        Changed in place, before it is compiled. A route taken earlier is undone, but not by one
-        that fails.
+        Changed in place, before it is compiled. An earlier route is undone, unless the call fails.
     geom : str
-        Name of a geom, or "body/index" of an unnamed one, which gets that name. One that collides
-        with nothing gets a contype and a conaffinity of 1; other geoms of its body go on colliding.
+        Name of a geom, or "body/index" of an unnamed one, which gets that name. A geom that
+        collides with nothing gets a contype and a conaffinity of 1. Other geoms of its body
+        continue to collide.
     route : str
-        "auto": "sdf" for a closed mesh, "flex" for an open one. "sdf": as a signed distance, which
-        MuJoCo computes when it compiles the model. For moving targets too, and right for geoms of
-        all shapes. Only planes meet the mesh's convex hull, and height fields nothing at all.
-        "flex": through a rigid flex of its triangles, with the geom's name and on its body; the
-        geom itself keeps its looks and mass. Planes and height fields meet it too, and an open mesh
-        is met from both sides. A step costs by the triangles, that of a signed distance by the
-        bodies: on ten thousand triangles ten balls take a third of its time, and one takes twice as
-        long. Right for spheres, capsules and ellipsoids, and for cylinders and meshes that sink in
-        by less than 0.7 of the flex's thickness (2 to 5 % of the mesh's size). Boxes may be thrown
-        aside, and SDF geoms sink in; a warning names both. See `add_flex_collider`. "convex": as
-        the convex parts of its mesh, geoms of their own without mass, which CoACD finds in some ten
-        seconds and which are then kept in the user's cache (needs the package coacd). The most
-        robust: boxes stack on it, and all geoms meet it. Bodies are held up to 2.5 % of the mesh's
-        size off the surface. For closed meshes. See `add_convex_collider`. "hull": as its convex
-        hull, MuJoCo's way for mesh geoms: fast, and right for convex meshes only.
+        How the geom collides:
+
+        - "auto": "sdf" for a closed mesh, "flex" for an open one.
+        - "sdf": as a signed distance, which MuJoCo computes when it compiles the model. It is right
+          for geoms of all shapes, and for moving targets too. But planes meet the mesh's convex
+          hull, and height fields do not meet it at all.
+        - "flex": through a rigid flex of its triangles, with the geom's name and on its body; the
+          geom itself keeps its looks and mass. Planes and height fields meet it too, and bodies
+          meet an open mesh from both sides. The time of a step depends on the number of triangles,
+          that of a signed distance on the number of bodies: on ten thousand triangles ten balls
+          take a third of its time, and one ball takes twice its time. The flex is right for
+          spheres, capsules and ellipsoids, and for cylinders and meshes that sink in by less than
+          0.7 of its thickness (2 to 5 % of the mesh's size). Boxes may be thrown aside, and SDF
+          geoms sink in; a warning names both. See `add_flex_collider`.
+        - "convex": as the convex parts of its mesh, which are geoms of their own without mass.
+          CoACD finds them in some ten seconds (needs the package coacd), and the user's cache keeps
+          them. This is the most robust way: boxes stack on it, and all geoms meet it. It holds
+          bodies up to 2.5 % of the mesh's size off the surface. For closed meshes. See
+          `add_convex_collider`.
+        - "hull": as its convex hull, which is MuJoCo's way for mesh geoms: fast, and right for
+          convex meshes only.
 
     Returns
     -------

@@ -109,21 +109,23 @@ def find_collision_geoms(
         if collides[target]:
             solids.insert(0, target)
         elif target not in named:
-            kin = _kin(model, target, free)
-            solids = [geom_id(geom) for geom in np.flatnonzero(kin).tolist()]
+            related = _related(model, target, free)
+            solids = [geom_id(geom) for geom in np.flatnonzero(related).tolist()]
         solids_by_target[target] = tuple(dict.fromkeys(solids))
     return solids_by_target
 
 
-def _kin(model: mujoco.MjModel, target: GeomId, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of the free geoms, [ngeom], collide for a target that names none."""
+def _related(model: mujoco.MjModel, target: GeomId, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether each of the free geoms, [ngeom], collides for a target that names none."""
     body = model.geom_bodyid[target]
-    kin = free & (model.geom_bodyid == body)
-    if body and kin.any():
-        return kin
+    on_body = free & (model.geom_bodyid == body)
+    if body and on_body.any():
+        return on_body
     weld = model.body_weldid[model.geom_bodyid]
-    kin = free & (weld == weld[target])
-    return kin if weld[target] else kin & _in_box(model, target)
+    on_welded_bodies = free & (weld == weld[target])
+    if weld[target]:
+        return on_welded_bodies
+    return on_welded_bodies & _in_box(model, target)
 
 
 def _in_box(model: mujoco.MjModel, target: GeomId) -> NDArray[np.bool_]:

@@ -245,10 +245,10 @@ class StepContacts(NamedTuple):
         corner_rows, corner_points, corner_forces = corners(
             rows, points, self.contacts.forces, 2 * self.on_texels.place_radii
         )
-        # whole geoms that are not wedged, then the corners of geoms that are
-        whole = (~wedged).nonzero()[0]
+        # geoms that are not wedged, then the corners of geoms that are
+        undivided = (~wedged).nonzero()[0]
         divided = wedged[corner_rows].nonzero()[0]
-        chosen = np.concatenate([whole, divided + count])
+        chosen = np.concatenate([undivided, divided + count])
         rows = np.concatenate([np.arange(count), corner_rows])[chosen]
         forces = np.concatenate([self.forces, corner_forces])[chosen]
         places, texels = atlas.nearest(np.concatenate([self.places, corner_points])[chosen])

@@ -525,12 +525,12 @@ class Ripples:
         if broken or not passed.elapsed:
             return
         self.follow_shapes()
-        solved, unsolved = self._solved.of(data)
-        self._warn_once("unsolved", unsolved)
+        solved, warning = self._solved.find(data)
+        self._warn_once("unsolved", warning)
         self._check_tunnelling(solved)
         for target, surface in self._soft.items():
             self._waves[target].move(surface.vertices(solved))
-        self._step_waves(data, solved, passed.elapsed, pending=unsolved is not None)
+        self._step_waves(data, solved, passed.elapsed, pending=warning is not None)
         self._sensor_data.write(data)
         self._warn_once("sensors", self._sensor_data.timestep_warning())
         self._check_amplitude()

@@ -56,18 +56,18 @@ class SolvedForces:
         self._poses = mujoco.MjData(model)
         # steps that were checked so far for the order of the loop's calls
         self._steps = 0
-        # whether the data was ever seen after `mj_step1`
+        # whether the data was ever seen after `mj_step1`, that is, moved on to the next step
         self._has_moved_on = False
         # a copy of the data, once it is needed
         self._completed: mujoco.MjData | None = None
 
-    def of(self, data: mujoco.MjData) -> tuple[mujoco.MjData, str | None]:
-        """Data with solved forces, and a warning where the forces are those of the coming step.
+    def find(self, data: mujoco.MjData) -> tuple[mujoco.MjData, str | None]:
+        """Data with solved forces, and a warning if the forces are those of the coming step.
 
-        The data are `data` itself until `data` is first seen to have moved on to the next step.
-        From then on they are a copy, completed as `mj_step2` will do with the present controls.
-        Forces that are solved already, as after `mj_forward`, come out the same. Where forces are
-        lost, the copy has them as they were, if they can be found.
+        This is `data` itself until `data` is first seen to have moved on to the next step. From
+        then on it is a copy, completed as `mj_step2` will do with the present controls. Forces that
+        are solved already, as after `mj_forward`, come out the same. If forces are lost, the copy
+        has them as they were, if they can be found.
         """
         model = self._model
         lost = _are_lost(data)

@@ -1,7 +1,7 @@
-"""A simulation as it is stepped by whoever owns its loop.
+"""The steps of a simulation that another program runs.
 
-`StepClock` follows its time and its resets. The warnings say what is wrong with its steps, and
-`physics_errors` makes MuJoCo's errors ours.
+`StepClock` follows the time and the resets of the simulation. The warnings say what is wrong with
+its steps, and `physics_errors` turns MuJoCo's errors into ours.
 """
 
 from __future__ import annotations
@@ -68,16 +68,16 @@ class StepClock:
     """Follows the simulation's time from look to look.
 
     The simulation began anew if its time went back, or if MuJoCo's data lost a mark. Then, as at
-    the first look, only the latest step counts: what came before belongs to no wave. At time 0
-    there was no step yet.
+    the first look, only the latest step counts: earlier steps belong to no wave. At time 0 there
+    was no step yet.
 
-    Time alone does not tell: a reset after one step, and one more step, and it is the same time
-    again; or steps that nobody saw after a reset bring the time to where it was, or beyond; or a
-    keyframe sets it to any value. The mark is a negative number in `data.solver_fwdinv[0]`: a step
-    leaves it alone, `copy` keeps it, and `mj_resetData`, a keyframe and the automatic reset of a
-    simulation that diverges all wipe it out. MuJoCo's own values there are not negative, and
-    written only where the flag `fwdinv` is enabled: then no mark is made. Of the resets that time
-    does not tell, only those at a divergence are then seen, by MuJoCo's warning of it.
+    Time alone does not show every reset. After a reset and one more step it may be the same as
+    before; unseen steps after a reset may bring it to where it was, or beyond; a keyframe may set
+    it to any value. So the data gets a mark, a negative number in `data.solver_fwdinv[0]`. A step
+    leaves it alone, and `copy` keeps it; `mj_resetData`, a keyframe and the automatic reset of a
+    simulation that diverges wipe it out. MuJoCo's own values there are not negative, and are
+    written only if the flag `fwdinv` is enabled. Then no mark is made, and of the resets that time
+    does not show only those at a divergence are seen, by MuJoCo's warning.
 
     A clock follows one simulation, in whichever data it is copied to. Two simulations were stepped
     in turn if the data was looked at before, but not at the last look; carries a mark, so that
@@ -108,39 +108,41 @@ class StepClock:
         """The events since the last look."""
         time = float(data.time)
         timestep = float(model.opt.timestep)
-        before = self._time
+        time_before = self._time
         timestep_before = self._timestep
         has_mark = can_be_marked(model) and read_mark(data) is not None
-        reset = self._sees_reset(model, data, before)
-        goes_on = before is not None and not reset and time > before
+        reset = self._sees_reset(model, data, time_before)
+        goes_on = time_before is not None and not reset and time > time_before
         in_turn = self._is_back_at(data) and has_mark and not goes_on
         self._time = time
         self._timestep = timestep
-        if before is None or reset:
+        if time_before is None or reset:
             return Passed(timestep if time else 0.0, reset=reset, in_turn=in_turn)
         if in_turn:
             return Passed(0.0, in_turn=True)
-        return self._passed(time - before, timestep, timestep_before)
+        return self._steps_in(time - time_before, timestep, timestep_before)
 
-    def _sees_reset(self, model: mujoco.MjModel, data: mujoco.MjData, before: float | None) -> bool:
-        """Whether the simulation began anew since the last look, at the time `before` [s]."""
-        has_gone_back = before is not None and float(data.time) < before
+    def _sees_reset(
+        self, model: mujoco.MjModel, data: mujoco.MjData, time_before: float | None
+    ) -> bool:
+        """Whether the simulation began anew since the last look, at `time_before` [s]."""
+        has_gone_back = time_before is not None and float(data.time) < time_before
         if can_be_marked(model):
-            # a mark is made where there is none, and one that others made is taken over
+            # data without a mark gets one; a mark that another clock made is taken over
             mark = read_mark(data)
             if mark is None:
                 mark = make_mark(data)
             has_new_mark = self._mark not in (None, mark)
             self._mark = mark
             return has_gone_back or has_new_mark
-        # the automatic reset leaves its warning behind, and any other one wipes it out
+        # the automatic reset leaves MuJoCo's warning behind, and any other reset wipes it out
         diverged = divergence(data) is not None
-        has_other_warning = before is not None and diverged != self._diverged
+        has_other_warning = time_before is not None and diverged != self._diverged
         self._diverged = diverged
         return has_gone_back or has_other_warning
 
     @staticmethod
-    def _passed(elapsed: float, timestep: float, timestep_before: float) -> Passed:
+    def _steps_in(elapsed: float, timestep: float, timestep_before: float) -> Passed:
         """The steps in an elapsed time [s], of the present time step or of the one before [s]."""
         # a step that equals the last one to the last bit saves the solver new coefficients
         if abs(elapsed - timestep) < _ROUND_OFF * timestep:

@@ -187,7 +187,7 @@ def test_data_after_a_step_is_returned_unchanged(
     for step in range(400):
         data.mocap_pos[0, 2] = 0.1 + 0.05 * np.sin(0.1 * step)
         mujoco.mj_step(model, data)
-        assert solved.of(data) == (data, None)
+        assert solved.find(data) == (data, None)
 
 
 def test_forces_that_are_solved_already_stay_the_same() -> None:
@@ -197,6 +197,6 @@ def test_forces_that_are_solved_already_stay_the_same() -> None:
     for _ in range(200):
         mujoco.mj_step(model, data)
         mujoco.mj_forward(model, data)
-        found, unsolved = solved.of(data)
+        found, unsolved = solved.find(data)
         assert not unsolved
         np.testing.assert_allclose(found.efc_force, data.efc_force, rtol=1e-6, atol=1e-6)
