@@ -31,7 +31,7 @@ FLAGS = [
 ]
 DRAWINGS = 40
 DRAW = f"""const player = ripplePlayer.player, gl = player.drawing.gl;
-player.playing = false;
+player.detail.share = 1;
 for (let i = 0; i < {DRAWINGS}; i++) {{
   player.redraw();
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));  // waits for the drawing

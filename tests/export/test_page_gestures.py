@@ -158,6 +158,17 @@ def test_the_page_fills_the_screen(browser: Any, egg_page: Path) -> None:
         tab.wait_for_function("!document.fullscreenElement")
 
 
+def test_a_picture_that_stands_still_is_lit_pixel_by_pixel(browser: Any, egg_page: Path) -> None:
+    """In software, points are lit while something moves."""
+    with opened(browser, egg_page) as tab:
+        tab.evaluate("ripplePlayer.ready.then(() => 0)")
+        tab.wait_for_function("ripplePlayer.player.drawing.fine")  # flat waves rest
+        tab.evaluate("ripplePlayer.player.poke(ripplePlayer.player.pick(0, 0.2), 1)")
+        tab.wait_for_function("!ripplePlayer.player.drawing.fine")
+        tab.keyboard.press("Space")
+        assert tab.evaluate("ripplePlayer.player.drawing.fine")
+
+
 def test_pixels_that_were_given_up_come_back(browser: Any, egg_page: Path) -> None:
     """A browser that is busy for a while shows fewer pixels, and tries more of them again."""
     with opened(browser, egg_page) as tab:

@@ -325,11 +325,14 @@ function clock(player, ui) {
   requestAnimationFrame(tick);
 }
 
-// After the last frame the waves live on; where they rest, nothing is drawn.
+// After the last frame the waves live on; where they rest, nothing is drawn any more.
 async function liveOn(player, last, next) {
-  const moves = player.surfaces.some(surface => surface && !surface.still);
+  const rests = player.surfaces.every(surface => !surface || surface.still);
   if (player.number < last) await player.show(last);
-  else if (moves) await player.liveOn((next - last) / player.meta.fps);
+  else if (!rests) await player.liveOn((next - last) / player.meta.fps);
+  if (player.resting === rests) return;
+  player.resting = rests;
+  player.redraw();
 }
 
 const player = new Player(document.getElementById("view"));

@@ -5,6 +5,7 @@ async function bytesOf(text) {
 }
 
 async function inflated(raw) {
+  if (!window.DecompressionStream) throw new Error("this browser is older than 2023");
   const stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }

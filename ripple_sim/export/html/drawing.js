@@ -7,7 +7,7 @@ const HEATED = [0.62, 0.62, 0.62]; // what is lit under the colours of heights
 const HALF_OPAQUE = [0.5, 2];
 const OPAQUE = [0.95, 2];
 const CLEAR = [0.02, 0.95];
-const SHADOW_CELL = 4; // texels of the shadow map between the points of surfaces in it
+const SHADOW_CELL = 3; // texels of the shadow map between the points of surfaces in it
 
 class Drawing {
   constructor(canvas, meta) {
@@ -101,17 +101,18 @@ class Drawing {
   // Draws a target from now on as `displace` left it.
   upload(part) {
     const gl = this.gl;
-    for (const i of part.lit ? [0] : [0, 1, 3]) {
+    for (const i of [0, 1, 3]) {
       gl.bindBuffer(gl.ARRAY_BUFFER, part.buffers[i]);
       gl.bufferSubData(gl.ARRAY_BUFFER, 0, part.data[i]);
     }
   }
 
   // With what `view` and `bodies` say of the camera and the bodies' places; arrows are matrices;
-  // `heat`: targets show their heights. Everything is uploaded before anything is drawn, which
-  // would wait for it.
-  draw(view, bodies, arrows, heat) {
+  // `heat`: targets show their heights; `fine`: their pixels are lit, where else it is their points.
+  // Everything is uploaded before anything is drawn, which would wait for it.
+  draw(view, bodies, arrows, heat, fine) {
     const gl = this.gl;
+    this.fine = fine;
     const light = lightOf(this.meta, view, this.environment.diffuse([0, 0, 1]), this.shadowSize);
     const parts = this.placed(bodies, view.eye);
     const casters = parts.filter(({part}) => part.opacity === 1);
@@ -143,7 +144,7 @@ class Drawing {
     this.bind(5, this.environment.ambient);
     this.bind(6, this.environment.mirrored(COAT_ROUGHNESS));
     gl.disable(gl.DEPTH_TEST);
-    for (const {part, model} of parts) if (part.lit) this.lightPoints(part, model);
+    for (const {part, model} of parts) if (this.isLitByPoints(part)) this.lightPoints(part, model);
     gl.enable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
@@ -159,6 +160,11 @@ class Drawing {
     gl.disable(gl.BLEND);
     for (const model of arrows) this.drawPart({part: this.arrow, model});
     if (this.smoothing) this.smooth(bodies, view, arrows);
+  }
+
+  // Whether a target's points are lit in this frame, and not its pixels.
+  isLitByPoints(part) {
+    return Boolean(part.lit) && !this.fine;
   }
 
   // Lights the points of a target for `drawPart`.
@@ -184,7 +190,7 @@ class Drawing {
       .map(part => {
         const model = part.parts ? IDENTITY : times(bodies[part.body], part.local);
         if (part.parts) part.place(bodies, eye);
-        if (part.lit) part.lit.place(model, eye);
+        if (this.isLitByPoints(part)) part.lit.place(model, eye);
         return {part, model, opacity: part.opacity * (1 - 0.6 * part.transparency)};
       })
       .sort((a, b) => b.opacity - a.opacity);
@@ -245,14 +251,15 @@ class Drawing {
   }
 
   drawPart({part, model}, texels = this.isClear(part) ? OPAQUE : HALF_OPAQUE) {
-    if (part.lit) {
+    const byPoints = this.isLitByPoints(part);
+    if (byPoints) {
       this.bind(3, part.lit.colors);
       this.gl.useProgram(this.triangles.program);
       this.triangles.set({modelProjection: times(this.shared.viewProjection, model), colors: 3});
     } else {
       this.look("surface", part, model, texels);
     }
-    const drawn = part.lit || part;
+    const drawn = byPoints ? part.lit : part;
     this.mesh(drawn, drawn.all);
   }
 

@@ -88,6 +88,7 @@ class Player {
     });
     this.orbit = null; // azimuth and elevation [radians], distance and focus; null: the scene's camera
     this.poked = false;
+    this.resting = false; // after the end, when no wave moves any more
     this.rival = null; // waves of another operator, which are shown beside
     this.meta = JSON.parse(document.getElementById("meta").textContent);
     this.work = Promise.resolve(); // what goes through time, one after the other
@@ -168,9 +169,14 @@ class Player {
     this.timeline.forgetAll();
   }
 
+  get isStill() {
+    return !this.playing || this.resting;
+  }
+
   // Draws a frame, or a moment between two, at once; returns when it is on the canvas.
   show(number) {
     this.work = this.work.then(async () => {
+      this.resting = false;
       this.number = Math.max(this.frames.first || 0, Math.min(number, this.frames.count - 1));
       const reached = this.live ? this.number : Math.floor(this.number);
       await this.timeline.to(reached);
@@ -231,9 +237,10 @@ class Player {
     return surface.pointHeights();
   }
 
+  // Draws the present picture again, in all detail where it stands still.
   redraw() {
     if (!this.frame || this.drawing.lost) return;
-    const scale = (window.devicePixelRatio || 1) * (this.playing ? this.detail.share : 1);
+    const scale = (window.devicePixelRatio || 1) * (this.isStill ? 1 : this.detail.share);
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map(x =>
       Math.max(1, Math.round(x * scale)),
     );
@@ -263,7 +270,7 @@ class Player {
   drawOn(surfaces) {
     const view = this.view(this.canvas.width / this.canvas.height);
     const bodies = this.bodies();
-    this.drawing.draw(view, bodies, this.contacts ? this.arrows() : [], this.heat);
+    this.drawing.draw(view, bodies, this.contacts ? this.arrows() : [], this.heat, this.isStill);
     if (this.grid) this.drawGrids(surfaces, view, bodies);
   }
 
