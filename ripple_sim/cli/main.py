@@ -11,6 +11,7 @@ signal that ended the command.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import difflib
 import io
 import logging
@@ -21,7 +22,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_type_hints
 
 import tyro.conf
 import tyro.extras
@@ -240,6 +241,8 @@ def parse(argv: Sequence[str]) -> Any:
             f"there is no command {shown(argv[0])}{suggestion}; commands are {names}; see "
             "ripple-sim --help"
         )
+    if argv and {"-h", "--help"} & set(argv):
+        _join_help_lines(COMMANDS.get(argv[0]))
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
@@ -279,6 +282,25 @@ def _suggestion(word: str, words: Iterable[str]) -> str:
     """A question with the one of `words` that is most like a word; empty if none is like it."""
     matches = difflib.get_close_matches(word, list(words), n=1)
     return f" (did you mean {matches[0]}?)" if matches else ""
+
+
+def _join_help_lines(command: Any) -> None:
+    """Let the help of a command flow: tyro would break its texts where the docstrings break."""
+    if not dataclasses.is_dataclass(command):
+        return
+    import docstring_parser  # as tyro does
+
+    types = get_type_hints(command, include_extras=True)
+    for base in command.__mro__:
+        if not dataclasses.is_dataclass(base):
+            continue
+        for field in docstring_parser.parse_from_object(base).params:
+            text = field.description or ""
+            if "\n" in text and field.arg_name in types:
+                help_text = arg(help=" ".join(text.split()))
+                command.__annotations__[field.arg_name] = Annotated[
+                    types[field.arg_name], help_text
+                ]
 
 
 def _options_of(command: str) -> list[str]:

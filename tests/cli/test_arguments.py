@@ -1,11 +1,19 @@
 """Arguments: what they mean, which are refused, and that every option is documented."""
 
 import dataclasses
+import re
 from pathlib import Path
 
 import pytest
 
-from ripple_sim.cli import DropCommand, RenderCommand, ViewCommand, parse, parsers
+from ripple_sim.cli import (
+    COMMANDS as ALL_COMMANDS,
+    DropCommand,
+    RenderCommand,
+    ViewCommand,
+    parse,
+    parsers,
+)
 from ripple_sim.overlay import operators
 from ripple_sim.scene import drop, drop_view
 from ripple_sim.solver.layouts import build
@@ -176,3 +184,21 @@ def test_help_prints_every_option_and_returns_no_command(
     assert parse(["render", "--help"]) is None
     text = capsys.readouterr().out
     assert all(f"--{option.replace('_', '-')}" in text for option in WORDS)
+
+
+@pytest.mark.parametrize("command", ALL_COMMANDS)
+def test_help_texts_break_only_at_the_edge_of_the_terminal(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "1000")
+    assert parse([command, "--help"]) is None
+    lines = capsys.readouterr().out.splitlines()
+    # a frame of lines if stdout is UTF-8, and of blanks if not
+    is_text = [bool(re.match(r"[│ ] {5,}[^ │]", line)) for line in lines]
+    continued = [
+        line
+        for line, before, here in zip(lines[1:], is_text, is_text[1:], strict=False)
+        if before and here
+    ]
+    assert lines
+    assert continued == []
