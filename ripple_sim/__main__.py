@@ -6,12 +6,6 @@ Signals are set up before anything else is imported.
 import atexit
 import sys
 
-if sys.platform == "win32":
-    sys.exit(
-        "ripple-sim: commands run on Linux and macOS; on Windows run them in WSL 2, or use the "
-        "Python package"
-    )
-
 from ripple_sim.cli.signals import end_at_once, finish_undisturbed
 
 end_at_once()

@@ -9,7 +9,6 @@ node, /dev/dri/renderD*; NVIDIA's opens /dev/nvidia*.
 from __future__ import annotations
 
 import ctypes
-import grp
 import importlib.metadata
 import json
 import os
@@ -136,7 +135,12 @@ def _vendor_problems() -> Iterator[str]:
 
 def _device_problems(devices: Path) -> Iterator[str]:
     """Render nodes of GPUs that the user may not open."""
-    for node in sorted(devices.glob("dri/renderD*")):
+    nodes = sorted(devices.glob("dri/renderD*"))
+    if not nodes:
+        return
+    import grp  # not on Windows, where there is no node either
+
+    for node in nodes:
         if not os.access(node, os.R_OK | os.W_OK, effective_ids=True):
             number = node.stat().st_gid
             try:
@@ -153,7 +157,7 @@ def _install_nvidia() -> str:
     """How to install the OpenGL libraries of NVIDIA's driver."""
     version = None
     if _NVIDIA_VERSION.exists():
-        version = re.search(r"\b(\d{3})\.\d+", _NVIDIA_VERSION.read_text())
+        version = re.search(r"\b(\d{3})\.\d+", _NVIDIA_VERSION.read_text(encoding="utf-8"))
     package = "libnvidia-gl-NNN, where NNN is the driver's version"
     if version is not None:
         package = f"libnvidia-gl-{version[1]}"
@@ -176,7 +180,7 @@ def _vendor_files() -> tuple[list[Path], str]:
 def _library_of(file: Path) -> str | None:
     """Library named in a vendor file; None if it cannot be read."""
     try:
-        return str(json.loads(file.read_text())["ICD"]["library_path"])
+        return str(json.loads(file.read_text(encoding="utf-8"))["ICD"]["library_path"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

@@ -54,18 +54,8 @@ def cache_folder() -> Path:
 @functools.cache
 def _private_folder(reason: str) -> Path:
     """A temporary folder that only this user can read; its first use gives a warning."""
-    folder = Path(tempfile.gettempdir()) / f"ripple-sim-{os.getuid()}"
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        status = folder.lstat()
-        safe = (
-            stat.S_ISDIR(status.st_mode)
-            and status.st_uid == os.getuid()
-            and not status.st_mode & 0o077
-        )
-    except OSError:
-        safe = False
-    if not safe:  # another user may have made the folder
+    folder = _lasting_private_folder()
+    if folder is None:
         folder = Path(tempfile.mkdtemp(prefix="ripple-sim-"))
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
     warn_caller(
@@ -73,6 +63,24 @@ def _private_folder(reason: str) -> Path:
         f"lasts"
     )
     return folder
+
+
+def _lasting_private_folder() -> Path | None:
+    """A folder of this user that outlives the process; None where it may be another user's."""
+    if not hasattr(os, "getuid"):  # Windows, whose temporary folder is the user's own
+        folder = Path(tempfile.gettempdir()) / "ripple-sim"
+        with contextlib.suppress(OSError):
+            folder.mkdir(exist_ok=True)
+            return folder
+        return None
+    folder = Path(tempfile.gettempdir()) / f"ripple-sim-{os.getuid()}"
+    with contextlib.suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        status = folder.lstat()
+        is_own = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
+        if is_own and not status.st_mode & 0o077:
+            return folder
+    return None
 
 
 def cache_path(name: str, arrays: Iterable[NDArray]) -> Path:

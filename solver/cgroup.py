@@ -31,5 +31,5 @@ def cgroup_folders(controller: str, root: Path = Path("/")) -> Iterator[tuple[Pa
 def text_of(path: Path) -> str:
     """The text of a file, or nothing where it cannot be read, as on other systems."""
     with contextlib.suppress(OSError):
-        return path.read_text()
+        return path.read_text(encoding="utf-8", errors="replace")
     return ""

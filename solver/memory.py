@@ -40,6 +40,14 @@ def require_memory(error: type[RippleError], need: float, what: str, advice: str
         )
 
 
+def address_space_limit() -> float:
+    """The limit of this process's address space [bytes], `ulimit -v`; infinite without one."""
+    if resource is None:
+        return math.inf
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return math.inf if limit == resource.RLIM_INFINITY else limit
+
+
 def rooms(root: Path = Path("/")) -> Iterator[tuple[float, str]]:
     """The memory that each limit leaves [bytes], and the name of the limit.
 
@@ -48,12 +56,11 @@ def rooms(root: Path = Path("/")) -> Iterator[tuple[float, str]]:
     free = _table(root / "proc/meminfo")
     if "MemAvailable" in free:
         yield free["MemAvailable"] + free.get("SwapFree", 0.0), "the machine's free memory"
-    if resource is not None:
-        address_space, _ = resource.getrlimit(resource.RLIMIT_AS)
-        if address_space != resource.RLIM_INFINITY:
-            used = _table(root / "proc/self/status").get("VmSize", 0.0)
-            name = f"the limit of the address space (ulimit -v, {_shown(address_space)})"
-            yield address_space - used, name
+    address_space = address_space_limit()
+    if address_space < math.inf:
+        used = _table(root / "proc/self/status").get("VmSize", 0.0)
+        name = f"the limit of the address space (ulimit -v, {_shown(address_space)})"
+        yield address_space - used, name
     for folder, is_first_version in cgroup_folders("memory", root):
         limit_file, usage_file = _FILES_OF_VERSION_1 if is_first_version else _FILES
         limit = text_of(folder / limit_file).strip()

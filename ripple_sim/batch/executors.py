@@ -6,7 +6,6 @@ All of them share the folder of the batch.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import functools
 import itertools
 import logging
@@ -24,12 +23,16 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
+from ripple_sim.encode.locks import locked
 from ripple_sim.errors import BatchError
 from ripple_sim.solver.cores import available_cores
 from ripple_sim.solver.errors import shown, user_line, work_for
 
 # Tasks for each Dask thread: with two, no thread waits for its next task.
 _TASKS_PER_THREAD = 2
+
+# The signal that ends a process at once: Windows has one such, and calls it SIGTERM.
+_KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
 
 # Time between two counts of the threads of a Dask cluster [s]: its scheduler takes a while to
 # answer.
@@ -154,8 +157,8 @@ class LocalExecutor(Executor):
         """End the processes; without `wait`, end them at once and drop unfinished work."""
         for pool, process_id in list(self._pools.values()):
             if not wait and process_id.done() and not process_id.exception():
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(process_id.result(), signal.SIGKILL)
+                with contextlib.suppress(OSError):  # it has ended by itself
+                    os.kill(process_id.result(), _KILL)
             pool.shutdown(wait, cancel_futures=cancel_futures)
 
     def _pool(self, place: int) -> ProcessPoolExecutor:
@@ -211,8 +214,7 @@ def first_alone(work: Path, task: str) -> Iterator[None]:
     """
     ready = work / f"ready-{socket.gethostname()}-{task}"
     if not ready.exists():
-        with (work / f"first-{socket.gethostname()}-{task}").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with locked(work / f"first-{socket.gethostname()}-{task}"):
             if not ready.exists():
                 yield
                 ready.touch()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import fcntl
 import hashlib
 import io
 import shutil
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
+from ripple_sim.encode.locks import locked
 from ripple_sim.errors import BatchError
 from ripple_sim.export.fields import DTYPES
 from ripple_sim.export.tables import COLUMNS
@@ -220,8 +220,7 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
     Scenes that are already in the tar file stay in it. The folders are removed when the tar file is
     complete: a call that is killed and repeated loses no scene and packs none twice.
     """
-    with (batch.work / f"tar-{first:06d}").open("a") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # one process at a time
+    with locked(batch.work / f"tar-{first:06d}"):
         loose = [number for number in range(first, end) if batch.scene(number).is_dir()]
         if not loose:
             return

@@ -2,7 +2,8 @@
 
 - `plan.json`: the plan of the scenes;
 - `scenes/000012`: a finished scene; or its files are in `tars/000000.tar`;
-- `work/000012`: a scene that is being made, locked by the process that makes it;
+- `work/000012`: a scene that is being made, and `work/000012.lock`, the lock of the process that
+  makes it;
 - `failed/000012.json` and `.log`: what went wrong with a scene.
 
 A scene is finished when its folder is renamed from `work` to `scenes`: nothing else has to be kept
@@ -13,9 +14,7 @@ names begin with its number.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import hashlib
-import os
 import re
 import shutil
 import tarfile
@@ -25,6 +24,7 @@ from typing import Any
 
 import msgspec
 
+from ripple_sim.encode.locks import FileLock
 from ripple_sim.encode.replace import sync
 from ripple_sim.errors import BatchError, SceneError
 from ripple_sim.scene.loading import load_scene
@@ -106,11 +106,7 @@ class BatchFolder:
         folders = (self.scenes, self.tars, self.failed, self.thumbnails, self.work)
         for folder in (self.path, *folders):
             for path in _entries(folder):
-                if path.is_symlink():
-                    raise BatchError(
-                        f"{path} is a link, which no batch makes; remove it and run the same "
-                        "command again"
-                    )
+                _check_no_link(path)
         for folder in folders:
             folder.mkdir(parents=True, exist_ok=True)
 
@@ -157,19 +153,20 @@ class BatchFolder:
         behind.
         """
         work = self.work / f"{number:06d}"
-        work.mkdir(parents=True, exist_ok=True)
-        handle = os.open(work, os.O_RDONLY | os.O_NOFOLLOW)
+        # beside the folder, which Windows renames only while no file in it is open
+        lock = FileLock(self.work / f"{number:06d}.lock")
+        is_claimed = lock.try_acquire()
         try:
-            is_claimed = False
-            with contextlib.suppress(BlockingIOError):  # another process makes the scene
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                is_claimed = not self.is_finished(number)
-                if not is_claimed:
-                    with contextlib.suppress(OSError):  # the folder is not empty
-                        work.rmdir()
+            if is_claimed and self.is_finished(number):  # by another process, meanwhile
+                is_claimed = False
+                with contextlib.suppress(OSError):  # the folder is not there, or not empty
+                    work.rmdir()
+            if is_claimed:
+                _check_no_link(work)
+                work.mkdir(parents=True, exist_ok=True)
             yield work if is_claimed else None
         finally:
-            os.close(handle)
+            lock.release()
 
     def finish(self, number: int, work: Path) -> None:
         """Put a scene that was made in `work` in its place, whole and on the disk."""
@@ -206,6 +203,14 @@ class BatchFolder:
                 f"{self.path} is not the folder of a batch: it has no plan.json; make one by "
                 "`ripple-sim batch PLAN.toml -o DIR`"
             )
+
+
+def _check_no_link(path: Path) -> None:
+    """Raise `BatchError` if a path is a link: it may lead out of the batch."""
+    if path.is_symlink():
+        raise BatchError(
+            f"{path} is a link, which no batch makes; remove it and run the same command again"
+        )
 
 
 def clear(folder: Path) -> None:

@@ -17,7 +17,6 @@ import io
 import logging
 import os
 import re
-import resource
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
@@ -30,6 +29,7 @@ from tyro.conf import Positional, arg
 
 from ripple_sim import __version__
 from ripple_sim.solver.errors import RippleError, shown
+from ripple_sim.solver.memory import address_space_limit
 
 from .render import DropCommand, ExportCommand, RenderCommand, ViewCommand
 from .reports import BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
@@ -91,8 +91,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(command: Any) -> int:
     """Run a command and return the exit status."""
     needed = _ADDRESS_SPACE_BY_COMMAND.get(type(command), 0)
-    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if limit != resource.RLIM_INFINITY and limit < 1e9 * needed:
+    limit = address_space_limit()
+    if limit < 1e9 * needed:
         text = (
             f"this needs {needed} GB of address space, but the limit (ulimit -v) is "
             f"{limit / 1e9:.2f} GB; allow more"
@@ -147,7 +147,7 @@ def _give_up_output(error: OSError) -> int:
 
     Nothing more is written to it, not even at exit.
     """
-    sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
+    sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
     return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
 
 
@@ -173,7 +173,7 @@ def _say(message: str) -> None:
         print(f"ripple-sim: {text}", file=sys.stderr, flush=True)
     except OSError:
         # standard error is full or a closed pipe: nothing more is written to it, not even at exit
-        sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115
+        sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
 
 
 class _Log(logging.Handler):
@@ -195,7 +195,8 @@ def _open_standard_streams() -> None:
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free, this one
         if getattr(sys, name) is None:
-            setattr(sys, name, Path(os.devnull).open("w" if number else "r"))  # noqa: SIM115
+            mode = "w" if number else "r"
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
 
 
 def completion(

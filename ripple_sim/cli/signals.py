@@ -15,6 +15,8 @@ code has ended:
 
 A second signal ends the process at once, and leaves the files behind that a kill would leave. A
 signal after the command, while the interpreter shuts down, changes nothing.
+
+Windows has no SIGHUP, and no timer that sends a signal: there a thread tries again.
 """
 
 from __future__ import annotations
@@ -22,11 +24,14 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from types import FrameType
 
 # What is printed for each signal.
-_WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
+_WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+if hasattr(signal, "SIGHUP"):
+    _WORDS[signal.SIGHUP] = "hung up"
 
 # Exit statuses of the signals.
 INTERRUPTED = 128 + signal.SIGINT
@@ -49,6 +54,11 @@ _NEVER_IN = (
 # Time until an exception is tried again [s].
 _RETRY_INTERVAL = 0.02
 
+_HAS_TIMER = hasattr(signal, "setitimer")
+
+# The thread that raises a signal again, where the system has no timer.
+_retry_thread: threading.Timer | None = None
+
 
 def word_of(status: int) -> str | None:
     """The word for the exit status of a signal; None for any other status."""
@@ -61,7 +71,7 @@ def end_at_once() -> None:
 
     A signal that the parent process ignores stays ignored.
     """
-    signal.setitimer(signal.ITIMER_REAL, 0)
+    _cancel_retry()
     _handle(_end)
 
 
@@ -98,8 +108,7 @@ def _end(number: int, frame: FrameType | None) -> None:
 def _raise(number: int, frame: FrameType | None) -> None:
     """Raise the exception of a signal, or try again later where it would do harm."""
     if _does_harm_in(frame):
-        signal.signal(signal.SIGALRM, lambda _, later_frame: _raise(number, later_frame))
-        signal.setitimer(signal.ITIMER_REAL, _RETRY_INTERVAL)
+        _retry(number)
         return
     end_at_once()
     if number == signal.SIGINT:
@@ -115,3 +124,24 @@ def _does_harm_in(frame: FrameType | None) -> bool:
             return True
         frame = frame.f_back
     return False
+
+
+def _retry(number: int) -> None:
+    """Have a signal handled again after a while."""
+    global _retry_thread
+    if _HAS_TIMER:
+        signal.signal(signal.SIGALRM, lambda _, later_frame: _raise(number, later_frame))
+        signal.setitimer(signal.ITIMER_REAL, _RETRY_INTERVAL)
+        return
+    _cancel_retry()
+    _retry_thread = threading.Timer(_RETRY_INTERVAL, signal.raise_signal, [number])
+    _retry_thread.daemon = True
+    _retry_thread.start()
+
+
+def _cancel_retry() -> None:
+    """Give up handling a signal again."""
+    if _HAS_TIMER:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+    elif _retry_thread is not None:
+        _retry_thread.cancel()

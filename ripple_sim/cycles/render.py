@@ -165,7 +165,7 @@ def _wait_for(number: int, process: subprocess.Popen, errors: Path) -> None:
         if text == f"frame {number}":
             return
         last = text or last
-    said = errors.read_text(errors="replace").strip().splitlines()
+    said = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
     reason = (said[-1] if said else last)[:_MAX_REASON_LENGTH] or "without a word"
     raise VideoError(f"Blender ended before frame {number} with status {process.wait()}: {reason}")
 

@@ -7,9 +7,8 @@ with, and `states.txt`, fingerprints of the simulation against which a resumed r
 
 from __future__ import annotations
 
-import fcntl
+import contextlib
 import json
-import os
 import re
 import shutil
 from collections.abc import Iterator, Mapping
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from ripple_sim.errors import VideoError
 
+from .locks import FileLock
 from .output import check_replaceable
 from .replace import MARK, is_plain, made_here, move, read_object
 
@@ -24,6 +24,7 @@ SETTINGS = "settings.json"
 STATES = "states.txt"
 _FRAMES = "frames"
 _WHOLE = "whole"
+_LOCK = ".lock"
 # A line of the states: a frame and its fingerprint. The semicolon is missing where a killed process
 # cut the line off.
 _STATE = re.compile(r"([0-9]{1,9}) ([0-9a-f]+);")
@@ -96,7 +97,7 @@ class Part:
                 f"cannot write {video}: {self.folder.name} beside it is no folder; move it away"
             )
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._lock = os.open(self.folder, os.O_RDONLY | os.O_NOFOLLOW)
+        self._lock = FileLock(self.folder / _LOCK)
         try:
             self._claim()
             # a kill while all is removed may have left the settings alone
@@ -107,7 +108,7 @@ class Part:
                 self._begin_anew({MARK: True, **settings})
             self._states = self._recorded_states()
         except BaseException:
-            os.close(self._lock)
+            self._lock.release()
             raise
         self.segments: list[tuple[Path, int]] = []
         self.frames = 0
@@ -117,7 +118,7 @@ class Part:
         """Empty the folder, and write the settings into it."""
         # first: without the settings nothing is continued
         (self.folder / SETTINGS).unlink(missing_ok=True)
-        for entry in self.folder.iterdir():
+        for entry in self._entries():
             shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
         self._segments.mkdir()
         unfinished = self.folder / f".{SETTINGS}"
@@ -199,13 +200,24 @@ class Part:
             self.remove()
             return ""
         self._drop_unfinished()
-        os.close(self._lock)
+        self._lock.release()
         return f"{self.frames} frames are kept in {self.folder}; --resume carries on from there"
 
     def remove(self) -> None:
         """Remove everything."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-        os.close(self._lock)
+        for entry in self._entries():
+            if entry.is_dir():
+                shutil.rmtree(entry, ignore_errors=True)
+            else:
+                with contextlib.suppress(OSError):
+                    entry.unlink()
+        self._lock.release()
+        with contextlib.suppress(OSError):  # something is left in it
+            self.folder.rmdir()
+
+    def _entries(self) -> list[Path]:
+        """What is in the folder, without the lock."""
+        return [entry for entry in self.folder.iterdir() if entry.name != _LOCK]
 
     def _compare(self, settings: Settings) -> None:
         """Raise `VideoError` with the first setting that differs from the interrupted video."""
@@ -220,13 +232,11 @@ class Part:
 
     def _claim(self) -> None:
         """Lock the folder, and make sure that it holds no other files."""
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+        if not self._lock.try_acquire():
             raise VideoError(
                 f"another process is writing {self.video}; wait until it is done, or name another "
                 "file"
-            ) from error
+            )
         other_files = sorted(self._other_files())
         if other_files:
             raise VideoError(
@@ -237,7 +247,7 @@ class Part:
     def _other_files(self) -> Iterator[str]:
         """Names of files that were not made here, in the folder and in that of the segments."""
         has_our_settings = MARK in read_object(self.folder / SETTINGS)
-        for entry in self.folder.iterdir():
+        for entry in self._entries():
             if entry.name == _FRAMES and entry.is_dir() and not entry.is_symlink():
                 for file in entry.iterdir():
                     if not _is_segment(file, has_our_settings):

@@ -13,6 +13,9 @@ from PIL.PngImagePlugin import PngInfo
 
 MARK = "made by ripple-sim"
 
+# Windows flushes only files that are open for writing.
+_IS_WINDOWS = os.name == "nt"
+
 # The mark is in the first or in the last so many bytes of a file.
 _HEAD_SIZE = 1 << 16
 _TAIL_SIZE = 1 << 10
@@ -42,7 +45,7 @@ def is_plain(path: Path) -> bool:
 def read_object(path: Path) -> dict[str, Any]:
     """The object in a JSON file; empty if the file is missing, damaged, special or no object."""
     try:
-        content = json.loads(path.read_text()) if path.is_file() else None
+        content = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
     # RecursionError: brackets in brackets without end
     except (OSError, ValueError, RecursionError):
         return {}
@@ -92,7 +95,9 @@ def check_folder(
 
 def sync(path: Path) -> None:
     """Wait until a file or folder has reached the disk."""
-    handle = os.open(path, os.O_RDONLY)
+    if _IS_WINDOWS and path.is_dir():  # no folder can be opened there
+        return
+    handle = os.open(path, os.O_RDWR if _IS_WINDOWS else os.O_RDONLY)
     try:
         os.fsync(handle)
     finally:

@@ -268,7 +268,9 @@ def _leave_glx() -> Restore | None:
 
 @functools.cache
 def _load_osmesa() -> ctypes.CDLL | None:
-    """The library of OSMesa that the program has loaded."""
+    """The library of OSMesa that the program has loaded; None on Windows, which cannot tell."""
+    if not hasattr(os, "RTLD_NOLOAD"):
+        return None
     for name in _OSMESA_LIBRARIES:
         with contextlib.suppress(OSError):
             osmesa = ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_NOW)

@@ -76,4 +76,4 @@ def _read(folder: Traversable, path: str, stage: str, seen: set[str]) -> str:
 
 @functools.cache  # a batch makes a renderer for every scene
 def _lines(file: Traversable) -> list[str]:
-    return file.read_text().splitlines()
+    return file.read_text(encoding="utf-8").splitlines()

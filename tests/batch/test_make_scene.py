@@ -1,9 +1,7 @@
 """Scenes of a batch are the same bytes in any order and in every container."""
 
 import errno
-import fcntl
 import json
-import os
 import pickle
 import tarfile
 
@@ -13,6 +11,7 @@ from small_batch import PLAN, files, new_batch, small_plan
 
 from ripple_sim import load_batch
 from ripple_sim.batch import in_shard, make_scene, pack, worker as module
+from ripple_sim.encode.locks import locked
 from ripple_sim.errors import BatchError
 
 
@@ -56,10 +55,9 @@ def test_finished_scenes_and_scenes_in_the_making_are_not_made_again(unbroken, t
     batch = new_batch(tmp_path, 'video = "none"\n')
     work = batch.work / "000000"
     work.mkdir()
-    other = os.open(work, os.O_RDONLY)
-    fcntl.flock(other, fcntl.LOCK_EX)
-    assert make_scene(str(batch.path), 0).state == "busy"
-    os.close(other)  # as when it dies
+    with locked(batch.work / "000000.lock"):
+        assert make_scene(str(batch.path), 0).state == "busy"
+    (batch.work / "000000.lock").touch()  # of a worker that died
     (work / "scene.json").write_text("from a worker that died")
     assert make_scene(str(batch.path), 0).state == "made"
     assert json.loads((batch.scene(0) / "scene.json").read_text())["files"].keys() == {

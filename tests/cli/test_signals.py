@@ -125,6 +125,13 @@ def test_a_signal_is_raised_only_after_calls_of_fragile_libraries_have_ended(num
     assert happenings_within("elsewhere", number) == []
 
 
+def test_without_a_timer_of_the_system_a_thread_raises_the_signal_again(monkeypatch) -> None:
+    """As on Windows."""
+    monkeypatch.setattr(signals, "_HAS_TIMER", False)
+    assert happenings_within("moderngl", signal.SIGINT) == ["call ended"]
+    assert happenings_within("elsewhere", signal.SIGINT) == []
+
+
 def test_a_signal_that_a_finalizer_swallows_is_raised_again() -> None:
     class Dying:
         def __del__(self) -> None:

@@ -1,8 +1,6 @@
 """Interrupted videos: what a kill leaves is whole, and they go on to the very same bytes."""
 
-import fcntl
 import json
-import os
 import random
 import shutil
 import signal
@@ -19,6 +17,7 @@ from programs import PROGRAMS
 from unfinished_videos import contents, written_until_full
 
 from ripple_sim.encode import FRAMES_IN_CLIP, FrameWriter, open_writer
+from ripple_sim.encode.locks import locked
 from ripple_sim.errors import VideoError
 
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
@@ -169,11 +168,11 @@ def test_resuming_a_different_simulation_is_refused_and_keeps_the_files(tmp_path
 
 
 def test_two_processes_do_not_write_the_same_video(interrupted):
-    other = os.open(interrupted.with_name("clip.mp4.part"), os.O_RDONLY)
-    fcntl.flock(other, fcntl.LOCK_EX)
-    with pytest.raises(VideoError, match="another process is writing"):
+    with (
+        locked(interrupted.with_name("clip.mp4.part") / ".lock"),
+        pytest.raises(VideoError, match="another process is writing"),
+    ):
         write(interrupted, 48, FRAMES)
-    os.close(other)
     assert write(interrupted, 48, FRAMES).frames == FRAMES
 
 
