@@ -287,7 +287,7 @@ def _suggestion(word: str, words: Iterable[str]) -> str:
 
 def _join_help_lines(command: Any) -> None:
     """Let the help of a command flow: tyro would break its texts where the docstrings break."""
-    if not dataclasses.is_dataclass(command):
+    if not isinstance(command, type):
         return
     import docstring_parser  # as tyro does
 
