@@ -21,7 +21,7 @@ from ripple_sim.solver.gl import context as gl, creation
 from ripple_sim.video import settings
 
 NOBODY = 65534
-pytestmark = pytest.mark.usefixtures("opengl")  # what is to be taken away must be there
+pytestmark = pytest.mark.usefixtures("opengl")  # tests take OpenGL away, so it must be there
 
 
 def info(**environment: str) -> dict:

@@ -165,7 +165,7 @@ MARKER = [-0.2, 0.0, 0.2]
 
 
 class MarkedEnv(BallEnv):
-    """As those of Gymnasium-Robotics: its render moves a body and adds a marker."""
+    """Like environments of Gymnasium-Robotics: its `render` moves a body and adds a marker."""
 
     def render(self) -> Any:
         self.data.geom("idle").xpos[:] = GOAL

@@ -90,7 +90,7 @@ def add_body(spec: mujoco.MjSpec, kind: str, name: str, place: list[float]) -> N
 
 
 def distance_to(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
-    """Distance from a point to a geom's surface, of a mesh that of its hull [m]."""
+    """Distance from a point to the surface of a geom, for a mesh to its hull [m]."""
     local = (point - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
     size = model.geom_size[geom]
     match model.geom_type[geom]:

@@ -239,7 +239,7 @@ def mean_error(atlas: Atlas, case: Case) -> float:
 
 
 def errors_against(exact: Values, atlas: Atlas, rim: str = "free") -> Values:
-    """Relative errors of the eigenvalues up to the twentieth but for that of the constant mode."""
+    """Relative errors of the first twenty eigenvalues, without the constant mode."""
     stiffness = stiffness_matrix(build_operator(atlas, Material(), "fem", rim).stencil)
     moving = exact > 1e-9 * exact[-1]
     return np.abs(least(stiffness, diags_array(atlas.areas.ravel()))[moving] / exact[moving] - 1)
@@ -291,7 +291,9 @@ def of_polyhedron(mesh: Mesh, halvings: int) -> Values:
     stiffness = np.zeros((len(F), 6, 6))
     # exact for products of linear slopes
     for place in ((0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5)):
-        share = np.zeros((6, 3))  # of each barycentric's slope in those of the six functions
+        share = np.zeros(
+            (6, 3)
+        )  # [function, barycentric]: slopes of the six functions, by slopes of the barycentrics
         for i in range(3):
             j = (i + 1) % 3
             share[i, i] = 4 * place[i] - 1

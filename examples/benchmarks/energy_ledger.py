@@ -143,10 +143,10 @@ def random_scene(rng: np.random.Generator) -> Scene:
 
 
 def rise(scene: Scene, *, own: bool = True, rigid: bool = False) -> tuple[float, str]:
-    """Greatest rise over the largest energy so far, as its share, and what the waves are in words.
+    """Greatest rise as a share of the largest energy so far, and the material in words.
 
-    Steps are our own, or `mujoco.mj_step` and `step`; or those of MuJoCo alone, where the target is
-    rigid.
+    Steps are taken by `Ripples.mj_step` (`own`), by `mujoco.mj_step` and `Ripples.step`, or, if the
+    target is `rigid`, by MuJoCo alone.
     """
     model = scene.model
     data = mujoco.MjData(scene.model)

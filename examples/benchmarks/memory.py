@@ -3,7 +3,8 @@
     python examples/benchmarks/memory.py [SCENE] [--short 5] [--long 60] [-- OPTIONS OF ripple-sim
     render]
 
-Each is a process of its own; counted is what it had in memory at most (ru_maxrss).
+Each render runs in a process of its own. The figure is the most memory that the process had
+(ru_maxrss).
 """
 
 import argparse

@@ -130,8 +130,8 @@ def three_field_frequency(
 
     omega^2 are the eigenvalues of a matrix [3, 3]: squares of the fields' own speeds and
     stiffnesses, surface first. The hidden fields are potentials of what moves along the layer
-    inside: the surface's coupling to them goes with q, by these two slopes, that of one to the
-    other does not. The matrix of each fit is positive for all q.
+    inside. The surface's coupling to them is proportional to q, by these two slopes; the coupling
+    between the two fields does not depend on q. The matrix of each fit is positive for all q.
     """
     matrix = np.zeros((len(q), 3, 3))
     matrix[:, range(3), range(3)] = np.array(stiff) + np.outer(q**2, fast)

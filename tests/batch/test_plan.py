@@ -1,4 +1,4 @@
-"""Plans: what they say is drawn as often as it says, and reaches the scene and the model."""
+"""Plans: drawn values have the stated distributions, and reach the scene and the model."""
 
 import msgspec
 import numpy as np

@@ -95,7 +95,7 @@ def test_exposures_are_spread_evenly_over_shutter_time_and_lens():
     assert not exposures_of(CameraEntry(shutter=180.0, aperture=0.1, exposures=1))[1].any()
     times, offsets = exposures_of(CameraEntry(shutter=180.0, aperture=0.1, exposures=40))
     np.testing.assert_allclose(times, np.arange(40) / 80)
-    # whatever part of the time is looked at, the eye has been all over the lens
+    # in each quarter of the time, the eye has been all over the lens
     for begin in range(0, 40, 10):
         part = offsets[begin : begin + 10]
         assert np.linalg.norm(part.mean(axis=0)) < 0.015

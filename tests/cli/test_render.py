@@ -23,7 +23,7 @@ from ripple_sim.solver.operator import PRESETS
 
 
 def terminal(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
-    """What is told on a terminal from now on."""
+    """The text that the program prints on a terminal from now on."""
     told = io.StringIO()
     told.isatty = lambda: True  # type: ignore[method-assign]
     monkeypatch.setenv("TERM", "xterm")

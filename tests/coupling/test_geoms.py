@@ -116,7 +116,8 @@ def model() -> mujoco.MjModel:
         (("shell",), {"shell": ["hull1", "link/3", "guard"]}, [["hull1", "guard"]]),
         (("shell",), {"shell": []}, [[]]),
         (("hull0",), {"hull0": ["hull1"]}, [["hull0", "hull1"]]),
-        # its body has none: those of bodies welded to it, which do not include the finger's
+        # the blade's body has no collision geom: it takes those of bodies welded to it, without the
+        # finger's
         (("blade",), {}, [["hull0", "hull1", "guard"]]),
         (("nail",), {}, [["pad"]]),
         # geoms of the world need not belong together

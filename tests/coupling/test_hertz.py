@@ -140,7 +140,7 @@ def test_the_duration_follows_from_the_curvatures_of_both_bodies(target, other, 
 @pytest.mark.parametrize("solref", ["0.02 1", "0.005 0.2", ELASTIC])
 def test_the_impulse_is_mujocos_to_the_last_digits(solref):
     run = Fall(solref=solref).steps(250)  # over several bounces where it bounces
-    for _ in range(200):  # what is missing comes when the ball is in the air, or at rest
+    for _ in range(200):  # the remainder comes when the ball is in the air, or at rest
         if abs(run.total / run.given() - 1) < 1e-12:
             break
         run.steps(1)

@@ -99,7 +99,7 @@ def test_one_warning_counts_missed_steps() -> None:
             given += sum(impulse.impulse for impulse in ripples.last_impulses)
     assert len(told) == 1
     assert told[0].filename == __file__
-    # what is known is given: the force of the latest step over this step
+    # the waves get the part that is known: the force of the latest step over this step
     assert given == pytest.approx(MASS * (data.qvel[2] + GRAVITY * data.time) / 5, rel=0.3)
     assert ripples["block"].time == pytest.approx(data.time - 4 * model.opt.timestep)
 

@@ -114,8 +114,7 @@ def _one_sphere_map_a_shape() -> Iterator[None]:
             shape = np.round((V - V.mean(axis=0)) / np.ptp(V, axis=0).max(), 4) + 0.0
             key = name, shape.tobytes(), F.tobytes()
             if key not in known:
-                # of the shape as it is looked up: what a test sees must not hang on which size came
-                # first
+                # the map of the rounded shape, so that results do not depend on the order of sizes
                 known[key] = sphere_map(shape, F)
             return known[key]
 

@@ -125,7 +125,7 @@ def made(
 
 
 def goes_on(clock: StepClock, model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Whether there was no reset, as told by the mark alone: it is always the same time."""
+    """Whether the clock saw no reset. The time stays the same, so only the mark can show one."""
     data.time = 1.0
     return not clock.look(model, data).reset
 

@@ -99,7 +99,7 @@ def test_ball_and_surface_exchange_momentum_and_keep_the_sum() -> None:
     sums = run.surface + run.bodies + 0.2 * GRAVITY * run.times
     gained = np.abs(sums - sums[0])
     exchanged = abs(run.surface[0])
-    # before 0.1 s there is no long contact, of which the rest filter holds a part back
+    # the rest filter holds back a part of long contacts, and there is none before 0.1 s
     assert gained[run.times < 0.1].max() < 1e-4 * exchanged
     assert run.bodies.max() > 0.02
     assert gained[run.times > 0.28].max() < 0.02 * exchanged

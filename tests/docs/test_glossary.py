@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 GLOSSARY = ROOT / "docs" / "glossary.md"
 
-# what is said: the retired words, or words one after the other
+# each entry is the word to use, and after the colon the retired words
 INSTEAD = """height map: relief reliefs; footprint cache: footing; reusable: used_before;
 reach: hovering;
 scratch: nowhere everywhere_infinite; contact load: felt press presses pressed;

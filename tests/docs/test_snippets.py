@@ -203,7 +203,7 @@ def test_the_commands_in_the_text_of_a_page_are_understood(page: Path) -> None:
 
 
 def test_own_loop_is_short() -> None:
-    # the ten lines that the README promises a MuJoCo user: what is not the model itself
+    # the README promises ten lines beside the model itself
     code = next(block.text for block in blocks(ROOT / "README.md") if block.language == "python")
     own = re.sub(r'model = .*?"""\)\n', "", code, flags=re.DOTALL)
     assert len([line for line in own.splitlines() if line.strip()]) <= 10

@@ -1,4 +1,4 @@
-"""Clips and stills: what is encoded in parts is decoded as one, each frame at its time."""
+"""Clips and stills: a video that is encoded in parts is decoded whole, each frame at its time."""
 
 import itertools
 import struct

@@ -104,7 +104,7 @@ def test_without_openexr_the_extra_is_named(tmp_path: Path, capsys, monkeypatch)
     options = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]
     assert cli.main(["render", "duck", *options]) == 2
     assert "pip install 'ripple-sim[exr]'" in capsys.readouterr().err
-    # what is asked for comes before what the machine lacks
+    # a wrong argument is reported before a missing package
     assert cli.main(["render", "missing", *options]) == 2
     assert "missing" in capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""Outputs: which format a name means, the limits of every format, and what is not written over."""
+"""Outputs: formats by name, limits of every format, and files that are not written over."""
 
 from pathlib import Path
 

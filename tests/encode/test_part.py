@@ -1,4 +1,4 @@
-"""Interrupted videos: what a kill leaves is whole, and they go on to the very same bytes."""
+"""Interrupted videos: their finished parts are whole, and they continue to the same bytes."""
 
 import json
 import random
@@ -124,7 +124,7 @@ def test_without_resume_a_video_starts_anew(interrupted):
 
 
 def test_a_video_with_an_incomplete_part_folder_is_rendered_from_the_start(interrupted):
-    """The frames of a folder are in their place by then, or those of a file removed first."""
+    """A kill at the very end leaves settings without frames."""
     shutil.rmtree(interrupted.with_name("clip.mp4.part") / "frames")
     assert write(interrupted, 0, FRAMES).frames == FRAMES
     assert list(interrupted.parent.iterdir()) == [interrupted]

@@ -1,4 +1,4 @@
-"""What an exporter refuses, and what it leaves behind."""
+"""An exporter refuses bad outputs, and leaves nothing behind after errors."""
 
 import importlib.util
 import shutil

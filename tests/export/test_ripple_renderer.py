@@ -161,7 +161,7 @@ def test_a_camera_after_kinematics_alone_gets_its_pose_with_a_warning(egg):
 
 @pytest.mark.filterwarnings("error")
 def test_data_without_poses_is_drawn_as_if_forwarded(egg):
-    """As it comes from `MjData(model)`; it stays as it is."""
+    """New data from `MjData(model)` is drawn, and is not changed."""
     model, data, _, renderer = egg
     new = mujoco.MjData(model)
     assert np.array_equal(renderer.render(new, "side"), renderer.render(data, "side"))
@@ -303,7 +303,7 @@ def test_the_studio_lights_on_demand_and_unsupported_flags_are_named(egg):
 
 
 def test_a_transparent_target_shows_objects_behind_it(egg):
-    """Twice blended, as in MuJoCo: where 40 % pass, 16 % of what is behind are seen."""
+    """MuJoCo blends twice: a target that lets 40 % pass shows 16 % of the objects behind it."""
     model, data = posed(
         MODEL.replace(
             "</worldbody>",

@@ -1,4 +1,4 @@
-"""Damaged mesh files are read and painted, or refused in one line, whatever they say."""
+"""Damaged mesh files are read and painted, or refused in one line."""
 
 import contextlib
 from pathlib import Path

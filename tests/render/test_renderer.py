@@ -67,7 +67,7 @@ def test_constant_height_looks_like_a_larger_sphere(gl):
 
 
 def test_constant_height_shades_as_flat(gl):
-    """With no gradient the shading normal stays the surface's, whatever the height."""
+    """Without a gradient, the shading normal is that of the flat surface at any height."""
     renderer, data, target = make(gl)
     flat = renderer.render(data, {target: constant_height_map(0.0)}, FRONT).astype(int)
     raised = renderer.render(data, {target: constant_height_map(0.002)}, FRONT).astype(int)

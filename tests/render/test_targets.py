@@ -1,4 +1,4 @@
-"""What is written into the G-buffer is what is read from it."""
+"""Values that are written into the G-buffer are read back unchanged."""
 
 import numpy as np
 import pytest

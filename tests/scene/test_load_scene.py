@@ -268,7 +268,7 @@ def test_mujocos_warnings_become_ours_and_no_log_file_is_written(
     path = ball_scene(tmp_path, f'<option magnetic="nan 0 0"/>{BALL}')
     with pytest.warns(RippleWarning, match="MuJoCo: XML contains a 'NaN'"):
         load_scene(path)
-    # an error of ours is told alone
+    # an error of ours comes without MuJoCo's warning
     with warnings.catch_warnings(action="error"), pytest.raises(SceneError, match="timestep"):
         load_scene(ball_scene(tmp_path, f'<option timestep="nan"/>{BALL}'))
     assert sorted(each.name for each in tmp_path.iterdir()) == ["scene.toml", "scene.xml"]

@@ -66,7 +66,7 @@ def points(count: int = 20) -> np.ndarray:
 @pytest.mark.parametrize("shift", [0.0, 0.3, -2.7])
 @pytest.mark.parametrize("scale", [1.0, 2.5])
 def test_a_packed_image_shows_what_the_sampler_shows(wrap: str, shift: float, scale) -> None:
-    """Another material beside it keeps the image from staying as it is."""
+    """A second material makes the image be packed; a single image would not change."""
     paints = (Paint((0.5, 1, 1, 1), IMAGE, wrap=(wrap, wrap)), Paint((0, 0, 1, 1)))
     uv = np.concatenate([scale * UV + shift, UV])
     image = packed(Looks(paints, np.array([0, 0, 1, 1])), uv, MaterialImages().of)

@@ -1,4 +1,4 @@
-"""The cache: kept under its limit, what was used longest ago first, nobody else's files touched."""
+"""The cache deletes the least recently used files first, and no files of other programs."""
 
 import os
 import weakref

@@ -1,4 +1,4 @@
-"""Bad arguments raise our error with the argument, its value and what is expected."""
+"""Bad arguments raise our error with the argument, its value and the expected values."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -107,7 +107,7 @@ def changed(content: bytes, changes: list[tuple[float, bytes]]) -> bytes:
 
 @contextlib.contextmanager
 def home_of_others() -> Iterator[Path]:
-    """A folder for one trial; it has a folder of somebody else's, which must stay as it is."""
+    """A folder for one trial. It contains a folder of another person, which must not change."""
     with tempfile.TemporaryDirectory() as name:
         home = Path(name)
         (home / "thesis").mkdir()
@@ -128,7 +128,7 @@ DAMAGES = st.lists(st.tuples(SHARES, KINDS, SHARES), min_size=1, max_size=3)
 
 
 def damage(folder: Path, damages: list[tuple[float, str, float]]) -> None:
-    """Spoil what is in a folder: which of all, how, and where in it.
+    """Spoil files of a folder. Each damage says which file, how, and where in the file.
 
     Links lead to a folder `thesis` beside.
     """

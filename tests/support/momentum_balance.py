@@ -1,4 +1,4 @@
-"""What bodies and surfaces exchange, by MuJoCo and by the bodies' velocities."""
+"""Momentum that bodies and surfaces exchange, by MuJoCo and by the bodies' velocities."""
 
 import collections
 import dataclasses
@@ -25,10 +25,10 @@ class Balance:
 
 
 class MomentumBalance:
-    """Keeps account of the exchange between targets and whatever touches them.
+    """Keeps account of the momentum that targets exchange with the bodies that touch them.
 
-    A free body's change of momentum, less gravity and all contact forces but the normal ones, is
-    what its contacts' normal forces gave it. Along their sum it is compared with them.
+    The change of momentum of a free body, less gravity and the friction of its contacts, is the
+    impulse of its normal forces. The two are compared along the sum of the normal forces.
     """
 
     def __init__(self, model: mujoco.MjModel, targets: list[str]) -> None:

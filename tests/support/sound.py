@@ -1,4 +1,4 @@
-"""What every mesh must be, whatever it was made of."""
+"""A sound mesh: what must hold for every mesh after cleaning."""
 
 import numpy as np
 

@@ -75,7 +75,7 @@ WORLDS |= dict.fromkeys(CAMERAS, _SEVERAL)
 _TENDON = '<tendon><spatial width=".02"><site site="a"/><site site="b"/></spatial></tendon>'
 
 
-# What lights a scene and what is around it: an MJCF's `<visual>`, skybox and lamp, and flags of the
+# Lights and surroundings of a scene: an MJCF's `<visual>`, skybox and lamp, and the flags of the
 # scene that are set.
 _STARS = """<texture type="skybox" builtin="gradient" rgb1=".5 .6 .7" rgb2=".1 .2 .3" width="256"
   height="256"

@@ -1,4 +1,4 @@
-"""How high and how steep waves are, beside the object that carries them, by a way of its own."""
+"""Height and slope of waves relative to their object, measured independently of the package."""
 
 import functools
 

@@ -1,4 +1,4 @@
-"""The viewer's page in a headless browser: its waves are those of the program, and it drives it."""
+"""The viewer's page in a headless browser has the program's waves, and controls the program."""
 
 import dataclasses
 import json
@@ -152,7 +152,7 @@ def field_of(waves: WaveSolver, texels: Any, values: Any) -> np.ndarray:
 
 
 def test_another_operator_is_shown_beside_with_waves_of_the_same_loads(page: Page) -> None:
-    """Its heights are those of a solver with that operator under the same loads."""
+    """The second picture has the heights of a solver with this operator and the same loads."""
     session = page.view.session
     page.tab.click("#tune")
     page.tab.select_option("#compare", "paper")

@@ -1,4 +1,4 @@
-"""How a large floor is drawn. The plotter of these tests keeps what it is given."""
+"""How a large floor is drawn. The plotter of these tests records its calls."""
 
 from types import SimpleNamespace
 

@@ -1,7 +1,7 @@
 // Draws a frame with WebGL 2: shadow map, shadows on the floor, surfaces, floor and background,
 // transparent surfaces, arrows. Where pixels are drawn by software, edges are smoothed afterwards:
 // samples would cost more; with alpha, the canvas is copied for nothing.
-const HEATED = [0.62, 0.62, 0.62]; // what is lit under the colours of heights
+const HEATED = [0.62, 0.62, 0.62]; // colour of the lit surface under the colours of heights
 // Least opacity, and opacity up to which texels of a texture are drawn: those that are more than
 // half opaque, where a texture has no others; opaque ones; and those that show what is behind them.
 const HALF_OPAQUE = [0.5, 2];

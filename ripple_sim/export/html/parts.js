@@ -120,7 +120,7 @@ function reachesOf(points, index) {
 }
 
 // Displaces a target from its rest by heights [m] of its points; `limit` is the height of the
-// strongest colours; normals are those of the triangles round a point, creases stay.
+// strongest colours; the normal of a point follows the triangles round it; creases stay.
 function displace(part, {rest, directions}, heights, limit) {
   const {F, source, data} = part;
   const count = part.points;

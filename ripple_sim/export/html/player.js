@@ -143,7 +143,7 @@ class Player {
     return [...this.surfaces, ...(this.rival ? this.rival.surfaces : [])].filter(Boolean);
   }
 
-  // Solves the waves as it is faster here, or by "loop" or "pass".
+  // Solves the waves in the way that is faster here, or by "loop" or "pass".
   chooseSolvers(kind) {
     this.allSurfaces.forEach(surface => this.chooseSolver(surface, kind));
   }
@@ -229,7 +229,7 @@ class Player {
     });
   }
 
-  // Heights of a target's points [m]: the recorded ones, or those of its surface's waves.
+  // Heights of a target's points [m]: recorded heights, or heights of the waves that the page solves.
   heightsOf(target, surface) {
     const steps = this.frame.steps[target];
     if (steps) return Float32Array.from(steps, step => step * this.meta.steps[target]);

@@ -1,4 +1,4 @@
-// The waves of another operator beside those of the run: the same loads drive both. The picture is
+// The waves of another operator beside the waves of the run: the same loads drive both. The picture is
 // drawn twice by WebGL, and the rival's is copied to a canvas of its own.
 
 class Rival {

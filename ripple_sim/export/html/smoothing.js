@@ -1,6 +1,6 @@
 // Smooths edges where WebGL runs on the processor: samples for each pixel would cost more. Only
 // the rectangles round the parts are smoothed, since floor and sky have no edges of their own.
-const EDGE_MARGIN = 8; // round the points of a part, which are those that cast shadows [pixels]
+const EDGE_MARGIN = 8; // round the points of a part that cast shadows [pixels]
 
 class Smoothing {
   constructor(gl, canvas) {

@@ -27,7 +27,7 @@ class TexelHeights {
     this.points = new Float32Array(law.samples.first.length);
   }
 
-  // Heights of the points [m] for those of the texels.
+  // Heights of the points [m] for heights of the texels.
   at(h) {
     this.surround(h);
     const {

@@ -112,7 +112,7 @@ class VolumeBalance {
     }
   }
 
-  // The acceleration of each part, with that of the load.
+  // The acceleration of each part, with the acceleration by the load.
   added({h, v, acceleration}) {
     const {
       law: {count, part},

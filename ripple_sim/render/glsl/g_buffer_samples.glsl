@@ -1,4 +1,4 @@
-// The samples of the G-buffer. With LAYER only those of a single, transparent object count.
+// The samples of the G-buffer. With LAYER only the samples of a single, transparent object count.
 #include "glsl/g_buffer.glsl"
 #include "glsl/view.glsl"
 

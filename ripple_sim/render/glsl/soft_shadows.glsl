@@ -212,7 +212,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
 #if OWN_POINTS
     in_narrow = in_narrow || narrow && lit * (1.0 - lit) > UNSEEN;
 #endif
-    // beyond the terminator a surface shades itself, whatever the map says of it
+    // beyond the terminator a surface shades itself, also where the map says otherwise
     return at.casts ? lit * smoothstep(-0.2, 0.15, facing) : lit;
 }
 

@@ -91,7 +91,7 @@ vec3 shaded(Object object, SurfaceSample surface, vec3 albedo, vec3 position, fl
 {
     float roughness = object.base.x, metallic = object.base.y, sheen = object.base.z, coat = object.base.w;
     float translucency = object.volume.x, transparency = object.volume.y, emission = object.volume.z;
-    float size = object.place.y, bumps = object.place.z;  // those that the shading normal accounts for
+    float size = object.place.y, bumps = object.place.z;  // that the shading normal accounts for
     vec3 normal = surface.rippled, flat_normal = surface.normal, view = normalize(start - position);
     bool from_behind = object.place.w == BACK_AS_FRONT_SHADING && surface.inner;  // of a sheet that is lit on its front
     normal = from_behind ? -normal : normal;
@@ -146,7 +146,7 @@ vec3 shaded(Object object, SurfaceSample surface, vec3 albedo, vec3 position, fl
     vec3 base = albedo * (direct + surround) * (1.0 - metallic) + translucency * albedo * glow;
     base += emission * albedo;
 #if LAYER
-    // transparent objects show what is behind them, refracted, and tinted by their thickness
+    // transparent objects show the objects behind them, refracted, and tinted by their own thickness
     vec3 behind = seen_through(position, surface.rippled, surface.thickness, size, translucency);
     base = mix(base, behind * pow(albedo, vec3(0.15 + 0.8 * surface.thickness)), transparency);
 #endif

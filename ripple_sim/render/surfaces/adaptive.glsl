@@ -41,8 +41,8 @@ int sum_up_to(int value)
 }
 
 #stage split
-// Edges whose height at the midpoint is off the mean of those at the ends. Heights are taken from whole texels: a texture
-// unit's own weights are coarse.
+// Mark the edges whose height at the midpoint differs from the mean of the heights at the ends. Heights are taken from
+// whole texels: a texture unit's own weights are coarse.
 #include "glsl/height_maps.glsl"
 
 layout(std430, binding = LONG_EDGES_BINDING) readonly buffer Edges { ivec4 edges[]; };  // number, and lookups: ends, midpoint
@@ -90,7 +90,8 @@ void main()
 }
 
 #stage add
-// Turns each group's number of triangles into that of all before it; the number of all goes into the draw call.
+// Replaces each group's number of triangles by the number of all triangles before the group. The total goes into the
+// draw call.
 layout(std430, binding = COMMAND_BINDING) writeonly buffer Command { int index_count; };
 
 void main()

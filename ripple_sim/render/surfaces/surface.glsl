@@ -61,7 +61,7 @@ vec3 heatmap_color(vec2 place)
 #if GRID
 uniform float grid_spacing;  // [texels]
 
-// Opacity of the lines, a pixel wide; those along the borders of the charts are stronger.
+// Opacity of the lines, a pixel wide; lines along the borders of the charts are stronger.
 float grid_ink(vec2 place, float resolution)
 {
     vec2 pixel = fwidth(place);

@@ -45,7 +45,7 @@ layout(location = 1) out vec4 g_color;
 void main()
 {
     vec3 albedo = textured(color.rgb, mapped, tiling);
-    bool inner = !gl_FrontFacing;  // of planes: whatever is closed shows its outer side alone
+    bool inner = !gl_FrontFacing;  // of planes alone: closed geoms show only their outer side
     encode_surface(inner ? -normal : normal, vec2(0.0), sqrt(albedo), pack_object(color.w, inner), vec2(1.0), 0.0, g_normal,
                    g_color);
 }

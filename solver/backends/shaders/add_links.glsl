@@ -1,5 +1,5 @@
 #version 430
-// Add what other cells than quads give to links, each of which is listed once.
+// Add the weights that links get from cells other than quads. Each link is listed once.
 layout(std430, binding = 0) buffer Links { float links[]; };
 layout(std430, binding = 1) readonly buffer Places { int places[]; };
 layout(std430, binding = 2) readonly buffer Values { float values[]; };

@@ -1,5 +1,5 @@
 #version 430
-// Give the copies of each link their mean, times a factor: 0 for what is no link.
+// Give the copies of each link their mean, times a factor, which is 0 where there is no link.
 layout(std430, binding = 0) buffer Links { float links[]; };
 layout(std430, binding = 1) readonly buffer Copies { int copies[]; };
 layout(std430, binding = 2) readonly buffer Groups { ivec2 groups[]; };  // first copy, one after the last

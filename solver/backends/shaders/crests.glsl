@@ -1,5 +1,5 @@
 #version 430
-// Raise the crests to the size of the height, with what is permanent of it; bits as in peak.glsl.
+// Raise the crests to the size of the height, with its permanent part; bits as in peak.glsl.
 #include "charts.glsl"
 
 layout(std430, binding = 0) readonly buffer Height { float h[]; };

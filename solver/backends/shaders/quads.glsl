@@ -1,6 +1,6 @@
 #version 430
-// Weights of the six links of the quads whose south-west corners are at the places. The law is that of cells.py, the
-// rest that of the kernel `quad_pass`, by the same names.
+// Weights of the six links of the quads whose south-west corners are at the places. The law is in cells.py. The
+// rest is like the kernel `quad_pass`, with the same names.
 layout(std430, binding = 0) readonly buffer Places { double places[]; };
 layout(std430, binding = 1) readonly buffer Conductance { float conductance[]; };
 layout(std430, binding = 2) readonly buffer PerArea { float per_area[]; };

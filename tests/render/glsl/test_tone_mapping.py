@@ -1,4 +1,4 @@
-"""Tone mapping: what is darker stays darker, greys stay grey, and dim light keeps its colour."""
+"""Tone mapping: darker light stays darker, greys stay grey, and dim light keeps its colour."""
 
 import numpy as np
 import pytest

@@ -123,7 +123,7 @@ def test_shadows_on_translucent_things_are_softer(gl):
         seen = {"targets": {"b": ball_surface(look)}, "size": (320, 240)}
         shaded, plain = (light_of(gl, body.format(flag), **seen) for flag in ("true", "false"))
         lit = (shaded / plain)[118:122, 140:155].mean(axis=0)  # beside the lamp's highlight
-        # whatever else lights it
+        # relative to the whole range, since other lamps light it too
         steepest[look] = np.abs(np.diff(lit, axis=0)).max(axis=0) / np.ptp(lit, axis=0)
     assert steepest["skin"][0] < 0.85 * steepest["clay"][0]
 
@@ -221,7 +221,7 @@ def test_water_is_a_lens(gl):
 
 
 def test_no_light_is_lost_beside_a_penumbra(gl):
-    """Where a box's shadow shows, what is plainly shaded is a few pixels away."""
+    """Pixels that lose a little light lie within a few pixels of pixels in clear shadow."""
     box = '<geom type="box" size=".5 .5 .5" pos="-.5 .2 .5" euler="0 0 40" rgba=".9 .1 .2 .4"/>'
     body = DARK_FLOOR + box + SUN
     size = (320, 240)

@@ -1,4 +1,4 @@
-"""Vertices of a target: as round and as sharp as it is, with heights from one place."""
+"""Vertices of a target are as round and as sharp as its mesh, and look heights up in one place."""
 
 import mujoco
 import numpy as np

@@ -1,4 +1,4 @@
-"""What is around a scene: the horizon of a skybox, into which the floor fades."""
+"""Surroundings of a scene: the horizon of a skybox, into which the floor fades."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""glTF files: every kind of primitive and accessor, the pose at rest, and what materials say."""
+"""glTF files: every kind of primitive and accessor, the pose at rest, and materials."""
 
 import base64
 import json

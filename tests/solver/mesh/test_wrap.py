@@ -1,4 +1,4 @@
-"""A closed surface round whatever is given, at the distance that was asked for."""
+"""Wraps: a closed surface round any set of triangles, at a given distance."""
 
 import igl
 import numpy as np

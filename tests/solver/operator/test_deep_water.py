@@ -132,7 +132,7 @@ def test_held_parts_stay_and_reflect(torus: Atlas) -> None:
     fixed = torus.positions[..., 0] < 0.2
     material = Material.water(DENSITY, 10.0)
     waves = WaveSolver(torus, Material(**{**vars(material), "fixed": fixed}), backend="gl")
-    assert waves.backend == "cpu"  # whatever is asked for
+    assert waves.backend == "cpu"  # although backend "gl" is asked for
     waves.add_impulse([0.6, 0.5, 0.0], 1.0, 0.1)
     waves.step(0.1)
     assert not waves.height[fixed].any()

@@ -1,4 +1,4 @@
-"""Rims of plates: published frequencies, energy of no sign but plus, both backends."""
+"""Rims of plates: published frequencies, energy that is never negative, both backends."""
 
 import functools
 

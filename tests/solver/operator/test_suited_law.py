@@ -1,4 +1,4 @@
-"""`Material.suited`: what was asked for is what the waves do, at every scale."""
+"""`Material.suited`: waves have the requested height, speed and decay at every scale."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Atlas files: what comes back, and what is said of files that are none."""
+"""Atlas files: which versions are read, and the messages for files that are no atlas."""
 
 from pathlib import Path
 

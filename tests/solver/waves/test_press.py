@@ -1,4 +1,4 @@
-"""A surface at rest under what presses on it: against series, energy and conditions of contact."""
+"""A surface at rest under pressing bodies: against series, energy and conditions of contact."""
 
 import numpy as np
 import pytest
