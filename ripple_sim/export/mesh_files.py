@@ -26,6 +26,7 @@ from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.visual import (
     texture_has_opacity,
     texture_is_half_clear,
+    texture_pixels,
     texture_pixels_with_opacity,
 )
 
@@ -238,6 +239,9 @@ def _paint(
     if texture >= 0:
         uv = mesh.visual.uv
         material.baseColorTexture = Image.fromarray(texture_pixels_with_opacity(model, texture))
+        if finish.glow >= 0:
+            material.emissiveTexture = Image.fromarray(texture_pixels(model, finish.glow))
+            material.emissiveFactor = [1.0, 1.0, 1.0]
         if opacity == 1 and texture_has_opacity(model, texture):
             material.alphaMode = "BLEND" if texture_is_half_clear(model, texture) else "MASK"
     mesh.visual = trimesh.visual.TextureVisuals(uv=uv, material=material)

@@ -227,6 +227,7 @@ class PageContent:
         pose = source.pose(data).in_perspective(aspect, "the page")
         textured = [part.meta for part in parts] + ([floor_meta] if floor_meta else [])
         textures = {surface["texture"] for surface in textured if surface["texture"] >= 0}
+        textures |= {each["glow"] for each in textured if each.get("glow", -1) >= 0}
         return {
             "fps": source.fps,
             "slowMotion": source.slow_motion,

@@ -180,6 +180,7 @@ def look_meta(model: mujoco.MjModel, finish: Finish) -> dict[str, Any]:
         "color": finish.color.tolist(),
         "opacity": finish.opacity,
         "texture": finish.texture,
+        "glow": finish.glow,
         "clear": finish.texture >= 0 and texture_is_half_clear(model, finish.texture),
         **{name: float(getattr(finish.look, name)) for name in names},
     }

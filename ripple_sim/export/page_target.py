@@ -97,7 +97,7 @@ class PageTarget:
         finish, _ = target_finish(source, self._name, self._surface)
         if self.part.meta["texture"] < 0 <= finish.texture:  # whose image the page does not have
             mean = mean_color(source.model, TextureMapping(texture=finish.texture))
-            finish = finish._replace(color=finish.color * mean, texture=-1)
+            finish = finish._replace(color=finish.color * mean, texture=-1, glow=-1)
         return look_meta(source.model, finish)
 
     def begin(self) -> str:

@@ -194,7 +194,7 @@ class Materials:
         mesh.CreateDisplayColorAttr([Gf.Vec3f(*map(float, finish.color))])
         if finish.opacity < 1:
             mesh.CreateDisplayOpacityAttr([finish.opacity])
-        key = finish.look, tuple(finish.color), finish.opacity, finish.texture
+        key = finish.look, tuple(finish.color), finish.opacity, finish.texture, finish.glow
         if key not in self._made:
             self._made[key] = self._material(finish)
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(self._made[key])
@@ -220,6 +220,10 @@ class Materials:
             shader.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f).Set(
                 color * look.emission
             )
+        if finish.glow >= 0:
+            image = self._image(path, finish.glow, Gf.Vec3f(1.0), "emission")
+            emissive = shader.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f)
+            emissive.ConnectToSource(image.GetOutput("rgb"))
         if finish.texture >= 0:
             image = self._image(path, finish.texture, color)
             diffuse.ConnectToSource(image.GetOutput("rgb"))
@@ -242,20 +246,22 @@ class Materials:
         material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
         return material
 
-    def _image(self, path: Sdf.Path, texture: int, tint: Gf.Vec3f) -> UsdShade.Shader:
+    def _image(
+        self, path: Sdf.Path, texture: int, tint: Gf.Vec3f, name: str = "image"
+    ) -> UsdShade.Shader:
         """Node that reads an image, times a linear colour, as "rgb", and its opacity, as "a"."""
         reader = UsdShade.Shader.Define(self._stage, path.AppendChild("st"))
         reader.CreateIdAttr("UsdPrimvarReader_float2")
         reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
-        image = UsdShade.Shader.Define(self._stage, path.AppendChild("image"))
+        image = UsdShade.Shader.Define(self._stage, path.AppendChild(name))
         image.CreateIdAttr("UsdUVTexture")
         if texture not in self._textures:  # where it is, from the stage's file
             self._images.mkdir(exist_ok=True)
-            name = f"texture_{texture}.png"
+            file = f"texture_{texture}.png"
             Image.fromarray(texture_pixels_with_opacity(self._model, texture)).save(
-                self._images / name, pnginfo=png_mark()
+                self._images / file, pnginfo=png_mark()
             )
-            self._textures[texture] = f"./{self._images.name}/{name}"
+            self._textures[texture] = f"./{self._images.name}/{file}"
         image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self._textures[texture])
         image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
         image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*tint, 1))

@@ -16,7 +16,11 @@ from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.corners import normalized
 from ripple_sim.render.visuals.geoms import visuals_of
 from ripple_sim.render.visuals.shapes import Shape, sizes
-from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
+from ripple_sim.render.visuals.texture_mapping import (
+    TextureMapping,
+    glow_texture,
+    mapping_of,
+)
 from ripple_sim.render.visuals.visual import (
     Look,
     Visual,
@@ -70,12 +74,15 @@ class Finish(NamedTuple):
     opacity : float
     texture : int
         Id of its flat texture, -1 without.
+    glow : int
+        Id of the flat texture of what it emits, -1 without.
     """
 
     look: Look
     color: NDArray[np.float64]
     opacity: float
     texture: int
+    glow: int = -1
 
 
 def solids(model: mujoco.MjModel, targets: set[TargetId], segments: int = 12) -> list[Solid]:
@@ -99,7 +106,9 @@ def target_finish(
     finish = _finish(model, *painted(model, geom, *source.paints[name], mesh.uv is not None))
     if finish.texture < 0:
         return finish, None
-    mapping = mapping_of(model, target_visual(model, geom))
+    visual = target_visual(model, geom)
+    mapping = mapping_of(model, visual)
+    finish = finish._replace(glow=glow_texture(model, visual, mapping))
     if not mapping.own or mesh.uv is None:
         return finish, texture_places(mapping, mapping.at(mesh.rest.astype(np.float64))[mesh.F])
     # v from the upper edge

@@ -68,6 +68,7 @@ class Unit(IntEnum):
     FLOOR_SEEN = 20  # the floor's light as solids see it
     TILE_KINDS = 21  # how each tile of the background is filled
     HORIZON = 22  # colours of the skybox along its horizon
+    GLOW_IMAGE = 23  # what a target emits, by its texture coordinates
 
 
 class Binding(IntEnum):
@@ -243,6 +244,7 @@ class Shading(IntEnum):
     HEATMAP = 1  # colours are shown as they are, except for shadows
     UNLIT = 2  # colours are shown as they are
     CLEAR = 3  # each texel has an opacity of its own, which the G-buffer has in place of ink
+    GLOWING = 4  # the G-buffer has the emitted share of the colour in place of ink
 
 
 OBJECT = Struct(
@@ -276,6 +278,7 @@ DEFINES: dict[str, object] = {
     # defaults, which passes may override
     "BACKDROP": 1,
     "TEXELS": int(Texels.ALL_TEXELS),
+    "GLOW": 0,
     "HORIZON": 0,
     "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
     "OBJECT_COLUMNS": OBJECT_COLUMNS,

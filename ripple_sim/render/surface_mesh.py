@@ -16,12 +16,12 @@ from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearan
 from ripple_sim.render.surfaces.tessellation import BAKED, DIRECTION, NORMAL, POSITION
 from ripple_sim.render.surfaces.vertices import mapped_coordinates, surface_vertices
 from ripple_sim.render.visuals.objects import Assets, Occluders
-from ripple_sim.render.visuals.texture_mapping import TextureMapping
+from ripple_sim.render.visuals.texture_mapping import TextureMapping, glow_texture
 from ripple_sim.render.visuals.visual import Visual, target_visual, texture_has_opacity
 from ripple_sim.solver.errors import RippleError
 
 from .bounds import balls_about
-from .contract import CasterMap, MappingKind, Shading, Texels
+from .contract import CasterMap, MappingKind, Shading, Texels, Unit
 from .height_map_textures import AnyHeightMap, HeightMapTextures, MovedHeightMap
 
 # Length of an edge [pixels], where the target fills the frame's height.
@@ -152,7 +152,7 @@ class SurfaceMesh:
         colors = surface.heatmap_colors
         self._heatmap = None if colors is None else HeatmapTexture(resources, page, colors)
         # for the G-buffer, and for the maps
-        self._solids: dict[tuple[MappingKind, Texels], moderngl.VertexArray] = {}
+        self._solids: dict[tuple[MappingKind, Texels, bool], moderngl.VertexArray] = {}
         self._casters: dict[tuple[CasterMap, Texels], moderngl.VertexArray] = {}
         self._is_lens = not self._is_open and look.transparency > 0.0
         # triangles in the maps: depths need no triangles that are split along waves, and colours on
@@ -170,8 +170,13 @@ class SurfaceMesh:
         """Take colour, material and texture from the visual of the target's geom."""
         look, rgb, mapping = appearance(self._assets.model, visual, self._surface)
         opacity = visual.opacity or 1.0  # targets that MuJoCo does not show are drawn all the same
-        for number in self.numbers:
-            self._objects.paint(number, look, opacity)
+        explains = self._heatmap is not None or self._surface.grid > 0
+        glow = -1 if explains else glow_texture(self._assets.model, visual, mapping)
+        self._glow = None if glow < 0 else self._assets.texture(glow)
+        usual = Shading.USUAL if glow < 0 else Shading.GLOWING
+        solid = Shading.HEATMAP if self._heatmap is not None else usual
+        for number, shading in zip(self.numbers, (solid, Shading.CLEAR), strict=True):
+            self._objects.paint(number, look, opacity, shading)
         self.transparent = look.transparency > 0.0 or opacity < 1.0
         self.blocks = not self.transparent
         self._rgb = rgb
@@ -197,7 +202,7 @@ class SurfaceMesh:
 
     def _solid(self, texels: Texels) -> moderngl.VertexArray:
         """Vertex array with the program that draws some texels into the G-buffer."""
-        key = self._mapping.kind, texels
+        key = self._mapping.kind, texels, self._glow is not None
         if key not in self._solids:
             surface = self._surface
             program = self._resources.program(
@@ -206,6 +211,7 @@ class SurfaceMesh:
                 HEATMAP=int(self._heatmap is not None),
                 GRID=int(surface.grid > 0),
                 TEXELS=texels,
+                GLOW=int(self._glow is not None),
             )
             program["resolution"] = float(self._page.resolution)
             if surface.grid:
@@ -364,6 +370,8 @@ class SurfaceMesh:
         program = solid.program
         if self._image is not None:
             self._image.use(self._mapping.unit)
+        if self._glow is not None:
+            self._glow.use(Unit.GLOW_IMAGE)
         if self._mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):
             program["tiling"] = self._mapping.tiling
         if self._heatmap is not None:

@@ -6,16 +6,26 @@ its wrap mode says, so that filtered texels of a block never mix with another bl
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
-from ripple_sim.solver.mesh.looks import BLEND, CLAMP, MASK, MIRROR, REPEAT, Looks, Paint
+from ripple_sim.solver.mesh.looks import (
+    BLEND,
+    CLAMP,
+    MASK,
+    MIRROR,
+    OPAQUE,
+    REPEAT,
+    Looks,
+    Paint,
+)
 
 # Longest side of a packed image [pixels]. It is longer where the colours of vertices need more.
 _LONGEST_SIDE = 4096
@@ -61,11 +71,34 @@ class PackedImage(NamedTuple):
         Texture coordinates of the corners; v is counted from the upper edge.
     scale : float
         By which the images were scaled to fit, 1 at most.
+    glow : uint8 [height, width, 3] or None
+        sRGB of the light that the surface emits; None if it emits none.
     """
 
     pixels: NDArray[np.uint8]
     uv: NDArray[np.float64]
     scale: float
+    glow: NDArray[np.uint8] | None = None
+
+
+class _Skin(NamedTuple):
+    """A material with its decoded images: what it reflects, and what it emits.
+
+    Attributes
+    ----------
+    paint : Paint
+        Whose colour is what it reflects.
+    image : uint8 [height, width, 4] or None
+    glow : Paint or None
+        Whose colour is what it emits; None if it emits nothing.
+    glow_image : uint8 [height, width, 4] or None
+        As large as `image`.
+    """
+
+    paint: Paint
+    image: NDArray[np.uint8] | None
+    glow: Paint | None
+    glow_image: NDArray[np.uint8] | None
 
 
 class _Block(NamedTuple):
@@ -76,11 +109,14 @@ class _Block(NamedTuple):
     pixels : uint8 [height, width, 4]
     triangles : int64 [k]
     places : float64 [k, 3, 2]
+    glow : uint8 [height, width, 3] or None
+        What the surface emits.
     """
 
     pixels: NDArray[np.uint8]
     triangles: NDArray[np.int64]
     places: NDArray[np.float64]
+    glow: NDArray[np.uint8] | None = None
 
 
 Decode = Callable[[Paint], NDArray[np.uint8] | None]
@@ -103,17 +139,17 @@ def packed(looks: Looks, corner_uv: NDArray[np.float64] | None, decode: Decode) 
     uv = np.zeros((count, 3, 2)) if corner_uv is None else np.nan_to_num(corner_uv)
     # v from the upper edge, and nothing that is too large for pixels
     uv = np.clip(uv, -1e6, 1e6) * [1.0, -1.0] + [0.0, 1.0]
-    images = {number: decode(looks.paints[number]) for number in np.unique(looks.paint).tolist()}
+    numbers = np.unique(looks.paint).tolist()
+    skins = {number: _skin(looks.paints[number], decode) for number in numbers}
     colors = _varied_colors(looks)
-    if len(images) == 1 and colors is None:
-        (number, image), *_ = images.items()
-        paint = looks.paints[number]
-        if image is not None and paint.wrap == (REPEAT, REPEAT):
-            return PackedImage(_tinted(image, paint), uv, 1.0)
-    scale = _first_scale(looks, uv, colors, images)
-    has_image = any(image is not None for image in images.values())
+    if len(skins) == 1 and colors is None:
+        (skin,) = skins.values()
+        if skin.image is not None and skin.paint.wrap == (REPEAT, REPEAT):
+            return PackedImage(_tinted(skin.image, skin.paint), uv, 1.0, _tinted_glow(skin))
+    scale = _first_scale(looks, uv, colors, skins)
+    has_image = any(skin.image is not None for skin in skins.values())
     while True:
-        blocks = _blocks(looks, uv, colors, images, scale)
+        blocks = _blocks(looks, uv, colors, skins, scale)
         can_shrink = has_image and scale > _LEAST_SCALE
         found = _laid_out(blocks, count, _LONGEST_SIDE if can_shrink else None, scale)
         if found is not None:
@@ -121,18 +157,43 @@ def packed(looks: Looks, corner_uv: NDArray[np.float64] | None, decode: Decode) 
         scale *= _SHRINK
 
 
+def _skin(paint: Paint, decode: Decode) -> _Skin:
+    """A material with its images; one that has an image of its emission alone gets a white one."""
+    image = decode(paint)
+    if paint.unlit:
+        black = dataclasses.replace(paint, color=(0.0, 0.0, 0.0, paint.color[3]))
+        return _Skin(black, image, dataclasses.replace(paint, alpha=OPAQUE), image)
+    if max(paint.emission) <= 0:
+        return _Skin(paint, image, None, None)
+    glow = Paint((*paint.emission, 1.0), wrap=paint.wrap)
+    glow_image = decode(Paint(image=paint.emission_image))
+    if glow_image is not None and image is None:
+        image = np.full(glow_image.shape, 255, np.uint8)
+    elif glow_image is not None and image is not None:
+        glow_image = _resized(glow_image, (image.shape[1], image.shape[0]))
+    return _Skin(paint, image, glow, glow_image)
+
+
+def _tinted_glow(skin: _Skin) -> NDArray[np.uint8] | None:
+    """What a material with an image emits, of the size of the image."""
+    if skin.glow is None or skin.image is None:
+        return None
+    image = np.full_like(skin.image, 255) if skin.glow_image is None else skin.glow_image
+    return np.ascontiguousarray(_tinted(image, skin.glow)[..., :3])
+
+
 def _first_scale(
     looks: Looks,
     uv: NDArray[np.float64],
     colors: NDArray[np.float64] | None,
-    images: dict[int, NDArray[np.uint8] | None],
+    skins: dict[int, _Skin],
 ) -> float:
     """Scale at which the images may fit, of the area that they take as they are; 1 at most."""
     area = 0.0
-    for number, image in images.items():
-        if image is None:
+    for number, skin in skins.items():
+        if skin.image is None:
             continue
-        height, width = image.shape[:2]
+        height, width = skin.image.shape[:2]
         places = _near_origin(uv[looks.paint == number], looks.paints[number].wrap)
         places = places[np.ptp(places, axis=1).max(axis=1) <= _MOST_REPEATS] * [width, height]
         if not len(places):
@@ -155,38 +216,65 @@ def _blocks(
     looks: Looks,
     uv: NDArray[np.float64],
     colors: NDArray[np.float64] | None,
-    images: dict[int, NDArray[np.uint8] | None],
+    skins: dict[int, _Skin],
     scale: float,
 ) -> list[_Block]:
     """Blocks that hold all triangles: of images, of images times colours, of plain colours."""
     blocks = []
     plain = np.zeros(len(uv), dtype=bool)
     # linear light and opacity of triangles that are plain, at their corners
-    shades = np.ones((len(uv), 3, 4))
-    for number, image in images.items():
-        paint = looks.paints[number]
+    shades = np.ones((len(uv), 3, 4)) if colors is None else colors.copy()
+    # what they emit, linear light
+    glows = np.zeros((len(uv), 3, 3))
+    for number, skin in skins.items():
         triangles = np.flatnonzero(looks.paint == number)
-        if image is None:
-            plain[triangles] = True
-            shades[triangles] = _factor(paint)
-            continue
-        local = _near_origin(uv[triangles], paint.wrap)
-        endless = np.ptp(local, axis=1).max(axis=1) > _MOST_REPEATS
-        plain[triangles[endless]] = True
-        shades[triangles[endless]] = _mean(image) * _factor(paint)
-        rest = triangles[~endless]
-        if not len(rest):
-            continue
-        smaller = _scaled(image, scale)
-        if colors is None:
-            blocks.append(_image_block(smaller, paint, rest, local[~endless]))
-        else:
-            blocks += _triangle_blocks(smaller, paint, rest, local[~endless], colors[rest])
+        local = _near_origin(uv[triangles], skin.paint.wrap)
+        is_plain = np.ptp(local, axis=1).max(axis=1) > _MOST_REPEATS
+        if skin.image is None:
+            is_plain[:] = True
+        few = triangles[is_plain]
+        plain[few] = True
+        if skin.glow is not None:
+            tint = shades[few, :, :3] if skin.glow.unlit else 1.0
+            glows[few] = (_mean(skin.glow_image) * _factor(skin.glow))[:3] * tint
+        shades[few] *= _mean(skin.image) * _factor(skin.paint)
+        if not is_plain.all():
+            tints = None if colors is None else colors[triangles[~is_plain]]
+            blocks += _skin_blocks(skin, scale, triangles[~is_plain], local[~is_plain], tints)
     if plain.any():
         triangles = np.flatnonzero(plain)
-        given = shades[triangles] if colors is None else shades[triangles] * colors[triangles]
-        blocks += _plain_blocks(triangles, given, looks)
+        blocks += _plain_blocks(triangles, shades[triangles], glows[triangles], looks)
     return blocks
+
+
+def _skin_blocks(
+    skin: _Skin,
+    scale: float,
+    triangles: NDArray[np.int64],
+    uv: NDArray[np.float64],
+    colors: NDArray[np.float64] | None,
+) -> list[_Block]:
+    """Blocks of triangles whose material has an image; with the corners' colours, if any."""
+
+    def blocks_of(image: NDArray[np.uint8], paint: Paint, tints: Any) -> list[_Block]:
+        smaller = _scaled(image, scale)
+        if tints is None:
+            return [_image_block(smaller, paint, triangles, uv)]
+        return _triangle_blocks(smaller, paint, triangles, uv, tints)
+
+    if skin.image is None:
+        return []
+    blocks = blocks_of(skin.image, skin.paint, colors)
+    if skin.glow is None:
+        return blocks
+    image = np.full_like(skin.image, 255) if skin.glow_image is None else skin.glow_image
+    tints = colors
+    if colors is not None and not skin.glow.unlit:
+        tints = np.ones_like(colors)
+    glows = blocks_of(image, skin.glow, tints)
+    return [
+        block._replace(glow=glow.pixels[..., :3]) for block, glow in zip(blocks, glows, strict=True)
+    ]
 
 
 def _factor(paint: Paint) -> NDArray[np.float64]:
@@ -194,9 +282,9 @@ def _factor(paint: Paint) -> NDArray[np.float64]:
     return np.clip(np.nan_to_num(np.array(paint.color)), 0.0, 1.0)
 
 
-def _mean(image: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Mean of an image, linear light and opacity."""
-    return _linear(image).mean(axis=(0, 1))
+def _mean(image: NDArray[np.uint8] | None) -> NDArray[np.float64]:
+    """Mean of an image, linear light and opacity; ones without an image."""
+    return np.ones(4) if image is None else _linear(image).mean(axis=(0, 1))
 
 
 def _near_origin(uv: NDArray[np.float64], wrap: tuple[str, str]) -> NDArray[np.float64]:
@@ -216,10 +304,16 @@ def _near_origin(uv: NDArray[np.float64], wrap: tuple[str, str]) -> NDArray[np.f
 
 def _scaled(image: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
     height, width = image.shape[:2]
-    size = max(1, round(scale * width)), max(1, round(scale * height))
-    if size == (width, height):
+    return _resized(image, (max(1, round(scale * width)), max(1, round(scale * height))))
+
+
+def _resized(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """An image of another size (width, height)."""
+    if size == image.shape[1::-1]:
         return image
-    return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BOX))
+    smaller = size[0] <= image.shape[1] and size[1] <= image.shape[0]
+    filtering = Image.Resampling.BOX if smaller else Image.Resampling.BILINEAR
+    return np.asarray(Image.fromarray(image).resize(size, filtering))
 
 
 def _image_block(
@@ -306,24 +400,29 @@ def _sampled(
 
 
 def _plain_blocks(
-    triangles: NDArray[np.int64], shades: NDArray[np.float64], looks: Looks
+    triangles: NDArray[np.int64],
+    shades: NDArray[np.float64],
+    glows: NDArray[np.float64],
+    looks: Looks,
 ) -> list[_Block]:
     """Blocks of triangles without an image: squares of one colour, or of the corners' colours.
 
-    `shades` [k, 3, 4] are linear light and opacity of the corners.
+    `shades` [k, 3, 4] are linear light and opacity of the corners, and `glows` [k, 3, 3] is the
+    light that they emit.
     """
+    shades = np.concatenate([shades, glows], axis=2)
     values = _encoded_by_paint(shades, looks, triangles)
     even = (values == values[:, :1]).all(axis=(1, 2))
     blocks = []
     if even.any():
         swatches, number = np.unique(values[even, 0], axis=0, return_inverse=True)
         side = _SWATCH if len(swatches) < _MANY_SWATCHES else _SMALL_SWATCH
-        squares = np.broadcast_to(swatches[:, None, None], (len(swatches), side, side, 4))
+        squares = np.broadcast_to(swatches[:, None, None], (len(swatches), side, side, 7))
         grid = _grid(squares, np.arange(len(swatches)))
         # the middle of the square: one place for all corners
         middle = grid.places[:, :1] + 0.5 * (side - 1)
         places = np.repeat(middle[number.ravel()], 3, axis=1)
-        blocks.append(_Block(grid.pixels, triangles[even], places))
+        blocks.append(grid._replace(triangles=triangles[even], places=places))
     uneven = np.flatnonzero(~even)
     # beyond the triangle its colours go on linearly, as far as there are such colours
     a, b, c = np.moveaxis(shades[uneven], 1, 0)
@@ -332,9 +431,9 @@ def _plain_blocks(
     for side, chosen in ((2, uneven[~is_steep]), (_STEEP_SQUARE, uneven[is_steep])):
         if len(chosen):
             blended = np.einsum("rck,mkx->mrcx", _square_weights(side), shades[chosen])
-            flat = np.clip(blended, 0.0, 1.0).reshape(len(chosen), -1, 4)
+            flat = np.clip(blended, 0.0, 1.0).reshape(len(chosen), -1, 7)
             pixels = _encoded_by_paint(flat, looks, triangles[chosen])
-            blocks.append(_grid(pixels.reshape(-1, side, side, 4), triangles[chosen]))
+            blocks.append(_grid(pixels.reshape(-1, side, side, 7), triangles[chosen]))
     return blocks
 
 
@@ -348,17 +447,22 @@ def _square_weights(side: int) -> NDArray[np.float64]:
 
 
 def _grid(squares: NDArray[np.uint8], triangles: NDArray[np.int64]) -> _Block:
-    """A block of squares [k, side, side, 4], each of a triangle, as `_square_weights` says."""
-    count, side = squares.shape[:2]
+    """A block of squares, each of a triangle, as `_square_weights` says.
+
+    The squares [k, side, side, 4 or 7] are sRGB and opacity, and sRGB of what is emitted.
+    """
+    count, side, _, channels = squares.shape
     across = math.ceil(math.sqrt(count))
     down = math.ceil(count / across)
-    grid = np.zeros((down * across, side, side, 4), np.uint8)
+    grid = np.zeros((down * across, side, side, channels), np.uint8)
     grid[:count] = squares
-    pixels = grid.reshape(down, across, side, side, 4).swapaxes(1, 2)
+    pixels = grid.reshape(down, across, side, side, channels).swapaxes(1, 2)
+    pixels = pixels.reshape(down * side, across * side, channels)
     row, column = np.divmod(np.arange(count), across)
     first = np.stack([column, row], axis=1)[:, None] * side + 0.5
     places = first + np.array([[0, 0], [side - 1, 0], [0, side - 1]])
-    return _Block(pixels.reshape(down * side, across * side, 4), triangles, places)
+    glow = pixels[..., 4:] if channels > 4 and pixels[..., 4:].any() else None
+    return _Block(pixels[..., :4], triangles, places, glow)
 
 
 def _tinted(image: NDArray[np.uint8], paint: Paint) -> NDArray[np.uint8]:
@@ -397,9 +501,11 @@ def _encoded(values: NDArray[np.float64], paint: Paint) -> NDArray[np.uint8]:
 def _encoded_by_paint(
     values: NDArray[np.float64], looks: Looks, triangles: NDArray[np.int64]
 ) -> NDArray[np.uint8]:
-    """Pixels of linear light and opacity [k, n, 4] of triangles with their materials."""
-    pixels = np.empty(values.shape, np.uint8)
-    pixels[..., :3] = _encode(values[..., :3])
+    """Pixels of triangles with their materials, for linear light.
+
+    The values [k, n, 7] are reflected light, opacity and emitted light.
+    """
+    pixels = _encode(values)
     paint_of = looks.paint[triangles]
     for number in np.unique(paint_of):
         chosen = paint_of == number
@@ -442,14 +548,19 @@ def _laid_out(
         return None
     pixels = np.zeros((height, width, 4), np.uint8)
     pixels[..., 3] = 255
+    glow = None
+    if any(block.glow is not None for block in blocks):
+        glow = np.zeros((height, width, 3), np.uint8)
     uv = np.zeros((count, 3, 2))
     for i, (left, top) in corners.items():
         block = blocks[i]
         rows, columns = block.pixels.shape[:2]
         pixels[top : top + rows, left : left + columns] = block.pixels
+        if glow is not None and block.glow is not None:
+            glow[top : top + rows, left : left + columns] = block.glow
         places = block.places + np.array([left, top])
         uv[block.triangles] = places / [width, height]
-    return PackedImage(pixels, uv, scale)
+    return PackedImage(pixels, uv, scale, glow)
 
 
 def _aligned(length: int) -> int:

@@ -45,6 +45,8 @@ class Painting:
         Means over the surface.
     notes : tuple of str
         What is not shown, one line each.
+    glow : uint8 [height, width, 3] or None
+        sRGB of the light that the surface emits, likewise.
     """
 
     pixels: NDArray[np.uint8]
@@ -52,6 +54,7 @@ class Painting:
     metallic: float | None = None
     roughness: float | None = None
     notes: tuple[str, ...] = ()
+    glow: NDArray[np.uint8] | None = None
 
 
 def paint_target(
@@ -121,24 +124,31 @@ def _give(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, painting: Painting, name: s
     asset = spec.mesh(geom.meshname)
     asset.usertexcoord = painting.uv.ravel()
     asset.userfacetexcoord = np.arange(painting.uv.size // 2)
-    height, width, channels = painting.pixels.shape
-    image = spec.add_texture(
+    _add_texture(spec, name, painting.pixels)
+    material = spec.add_material(name=name)
+    has_opacity = painting.pixels.shape[2] == 4
+    role = mujoco.mjtTextureRole
+    material.textures[role.mjTEXROLE_RGBA if has_opacity else role.mjTEXROLE_RGB] = name
+    if painting.glow is not None:
+        _add_texture(spec, f"{name}: emission", painting.glow)
+        material.textures[role.mjTEXROLE_EMISSIVE] = f"{name}: emission"
+    if painting.metallic is not None:
+        material.metallic = painting.metallic
+    if painting.roughness is not None:
+        material.roughness = painting.roughness
+    geom.material = name
+
+
+def _add_texture(spec: mujoco.MjSpec, name: str, pixels: NDArray[np.uint8]) -> None:
+    height, width, channels = pixels.shape
+    texture = spec.add_texture(
         name=name,
         type=mujoco.mjtTexture.mjTEXTURE_2D,
         height=height,
         width=width,
         nchannel=channels,
     )
-    image.data = painting.pixels.tobytes()
-    material = spec.add_material(name=name)
-    has_opacity = channels == 4
-    role = mujoco.mjtTextureRole
-    material.textures[role.mjTEXROLE_RGBA if has_opacity else role.mjTEXROLE_RGB] = name
-    if painting.metallic is not None:
-        material.metallic = painting.metallic
-    if painting.roughness is not None:
-        material.roughness = painting.roughness
-    geom.material = name
+    texture.data = pixels.tobytes()
 
 
 def _of_image(mesh: Mesh, mesh_path: str | Path, texture: str | Path) -> Painting:
@@ -162,7 +172,8 @@ def painting_of(mesh: Mesh, looks: Looks) -> Painting:
     notes = (*looks.notes, *images.notes())
     if image.scale < _NOTED_SCALE:
         notes = (*notes, f"its images are scaled to {image.scale:.0%} to fit into one texture")
-    return Painting(pixels, image.uv, metallic, roughness, notes)
+    glow = image.glow if image.glow is not None and image.glow.any() else None
+    return Painting(pixels, image.uv, metallic, roughness, notes, glow)
 
 
 def _mean_gloss(

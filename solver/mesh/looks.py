@@ -69,6 +69,12 @@ class Paint:
         0 to 1; None where the file gives none.
     gloss : ImageSource, optional
         Factors of roughness (green) and metallic (blue).
+    emission : tuple
+        Red, green and blue of the light that the surface emits, linear.
+    emission_image : ImageSource, optional
+        sRGB, by which the emission is multiplied.
+    unlit : bool
+        Whether the surface shows its colour without light, in place of `emission`.
     """
 
     color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
@@ -80,6 +86,9 @@ class Paint:
     metallic: float | None = None
     roughness: float | None = None
     gloss: ImageSource | None = None
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emission_image: ImageSource | None = None
+    unlit: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

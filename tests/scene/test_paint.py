@@ -175,6 +175,51 @@ def test_masks_have_holes_in_frames(opengl, tmp_path: Path) -> None:
     assert np.quantile(clear, 0.05) > whole.min() + 10
 
 
+def test_emission_is_packed_beside_the_colours_it_belongs_to() -> None:
+    """An image, a plain colour and colours without light, under the colours of corners."""
+    glow = ImageSource(png(PIXELS[::-1]), "glow")
+    paints = (
+        Paint((0.5, 1, 1, 1), IMAGE, emission=(1, 1, 0.5), emission_image=glow),
+        Paint((0, 0, 1, 1), emission=(0.2, 0.4, 0.6)),
+        Paint((0, 0.5, 1, 1), unlit=True),
+    )
+    colors = np.ones((4, 3, 4))
+    colors[3, :, 1] = 0.5
+    for given, green in ((None, 0.5), (colors, 0.25)):
+        looks = Looks(paints, np.array([0, 0, 1, 2]), given)
+        image = packed(looks, np.concatenate([UV, UV]), MaterialImages().of)
+        emitted = image._replace(pixels=image.glow)
+        for weights in points(8):
+            np.testing.assert_allclose(seen(emitted, 2, weights), [0.2, 0.4, 0.6], atol=0.01)
+            np.testing.assert_allclose(seen(emitted, 3, weights), [0, green, 1], atol=0.01)
+            np.testing.assert_allclose(seen(image, 3, weights), 0, atol=0.01)
+            if given is None:
+                u, v = weights @ UV[0]
+                truth = bilinear(PIXELS[::-1], np.array([6 * u, 4 * (1 - v)]), WRAPS[REPEAT])
+                np.testing.assert_allclose(
+                    seen(emitted, 0, weights), truth * [1, 1, 0.5], atol=0.01
+                )
+
+
+def test_emission_is_seen_where_a_black_surface_reflects_nothing(opengl, tmp_path: Path) -> None:
+    greens = []
+    for emission in (0.0, 1.0):
+        file = Gltf()
+        gloss = {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0, "roughnessFactor": 1}
+        material = file.add(
+            "materials", pbrMetallicRoughness=gloss, emissiveFactor=[0, emission, 0]
+        )
+        file.show(file.primitive(material=material))
+        path = file.write(tmp_path / "a.glb")
+        scene = drop_scene(path, bodies=0, up="y", view="front", elevation=0, look="model")
+        simulation = Simulation(scene, fps=10, resolution=16, backend="cpu")
+        frame = FrameSource(simulation, width=64, height=48).render(
+            next(iter(snapshots(simulation, 1)))
+        )
+        greens.append(frame[22:28, 29:35, 1].mean())
+    assert greens[1] > 180 and greens[0] < 100
+
+
 def glass_before_blue(folder: Path, opacity: float) -> Path:
     """A red square with an opacity, before a blue square that is as large."""
     file = Gltf()

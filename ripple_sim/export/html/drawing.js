@@ -86,8 +86,8 @@ class Drawing {
   }
 
   // The program that lights pixels or, as `kind` tells, points.
-  lighting(kind, {coat}, image, heat) {
-    const features = {COAT: coat, TEXTURED: image, HEAT: heat};
+  lighting(kind, {coat}, image, glow, heat) {
+    const features = {COAT: coat, TEXTURED: image, GLOWS: glow, HEAT: heat};
     const defined = Object.keys(features).filter(name => features[name]);
     const key = [kind, ...defined].join(" ");
     if (!this.known.has(key)) this.known.set(key, programOf(this.gl, ...this.shaders[kind], defined));
@@ -130,6 +130,7 @@ class Drawing {
       coatMap: 6,
       mirrorMap: 7,
       shades: 8,
+      glowImage: 9,
     };
     this.ready = new Set(); // programs that have these
     this.heated = heat;
@@ -267,11 +268,13 @@ class Drawing {
   look(kind, part, model, texels = HALF_OPAQUE) {
     const heat = this.heated && part.target;
     const image = heat ? null : this.imageOf(part);
+    const glow = heat ? null : this.images[part.glow];
     const color = heat ? HEATED : part.color;
     this.bind(1, image || this.blank);
+    if (glow) this.bind(9, glow);
     this.bind(7, this.environment.mirrored(Math.max(part.roughness, 0.0632)));
     if (color) this.gl.vertexAttrib3fv(COLOR, color);
-    this.use(this.lighting(kind, part, image, heat), {
+    this.use(this.lighting(kind, part, image, glow, heat), {
       model,
       open: Number(part.open),
       texels,

@@ -132,8 +132,8 @@ ${lamps.map(reflectedOf).join("")}
 }
 uniform sampler2D heatColors;
 // What the screen shows of a point, times its opacity.
-vec4 shownAt(vec3 point, vec3 normal, vec3 albedo, float height) {
-  vec3 shown = toneMapped(lit(point, normal, albedo));
+vec4 shownAt(vec3 point, vec3 normal, vec3 albedo, vec3 emitted, float height) {
+  vec3 shown = toneMapped(lit(point, normal, albedo) + emitted);
 #ifdef HEAT
   float light = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / 0.70, 0.45, 1.0);
   shown = texture(heatColors, vec2(0.5 + 0.5 * clamp(height, -1.0, 1.0), 0.5)).rgb * light;

@@ -67,7 +67,7 @@ struct SurfaceSample {
     vec3 normal;   // without ripples
     vec3 rippled;
     vec3 color;    // square root of the albedo
-    float ink;     // opacity of lines on top; of the surface, if its shading is CLEAR
+    float ink;     // opacity of lines on top; CLEAR: of the surface; GLOWING: emitted share of the colour
     float visibility, thickness;
     vec2 place;    // on the page of charts [texels]
     bool inner;    // whether the object's inner side is seen
@@ -211,10 +211,14 @@ vec4 lit_solid(SurfaceSample surface, vec3 position, float spread, bvec2 block)
     Object object = object_at(surface.object);
     bool heatmap = object.place.w == HEATMAP_SHADING, unlit = object.place.w == UNLIT_SHADING;
     vec3 albedo = heatmap ? vec3(NEUTRAL) : surface.color * surface.color;
-    vec3 radiance = shaded(object, surface, albedo, position, spread, block);  // of all, for neighbours take shadows over
+    float emitted = object.place.w == GLOWING_SHADING ? surface.ink : 0.0;  // share of the colour
+    // of all, for neighbours take shadows over
+    vec3 radiance = shaded(object, surface, (1.0 - emitted) * albedo, position, spread, block) + emitted * albedo;
     vec3 shown = unlit ? encoded(albedo) : tone_mapped(radiance);
     if (object.place.w == CLEAR_SHADING)
         return vec4(shown, surface.ink);
+    if (object.place.w == GLOWING_SHADING)
+        return vec4(shown, object.volume.w);
     float shade = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / FULL_LIGHT, DARKEST, 1.0);
     return vec4(mix(heatmap ? surface.color * shade : shown, INK, surface.ink), object.volume.w);
 }

@@ -1,6 +1,6 @@
 #version 410
 // A target into the G-buffer, with its texture; with HEATMAP one of the solver's fields in false colours, with GRID lines
-// between blocks of texels. TEXELS tells which texels of a flat texture with opacity are drawn.
+// between blocks of texels, with GLOW an image of the light that it emits. TEXELS tells which texels of a flat texture with opacity are drawn.
 uniform float resolution;  // texels along a chart's side
 
 VARYING vec3 normal;
@@ -44,6 +44,10 @@ uniform vec4 tiling;
 layout(location = 0) out vec4 g_normal;
 layout(location = 1) out vec4 g_color;
 
+#if GLOW
+layout(binding = GLOW_IMAGE_UNIT) uniform sampler2D glow_image;
+#endif
+
 #if HEATMAP
 layout(binding = HEATMAP_UNIT) uniform sampler2DArray heatmap;           // a page of charts, like a height map
 layout(binding = HEATMAP_COLORS_UNIT) uniform sampler2D heatmap_colors;  // sRGB, from the least to the greatest value
@@ -80,7 +84,12 @@ void main()
     if (!is_drawn(opacity))
         discard;
 #endif
-    vec3 shown = sqrt(textured(color.rgb, mapped, tiling));
+    vec3 reflected = textured(color.rgb, mapped, tiling), emitted = vec3(0.0);
+#if GLOW
+    emitted = texture(glow_image, mapped.xy * tiling.xy + tiling.zw).rgb;
+    reflected = min(reflected, 1.0 - emitted);
+#endif
+    vec3 shown = sqrt(reflected + emitted);
     // a pixel whose centre lies beside the triangle must not leave its chart
     vec2 inside = clamp(place, chart + 1.0, chart + resolution + 1.0);
     float ink = 0.0;
@@ -92,6 +101,8 @@ void main()
 #endif
 #if TEXELS == CLEAR_TEXELS
     ink = opacity;
+#elif GLOW
+    ink = dot(emitted, vec3(1.0)) / max(dot(reflected + emitted, vec3(1.0)), 1e-6);
 #endif
     bool inner = !gl_FrontFacing;  // of an open surface: closed ones show their outer side alone
     encode_surface(inner ? -normal : normal, inside / vec2(textureSize(height_maps, 0).xy), shown,

@@ -88,9 +88,17 @@ class ObjectTable:
         self.paint(number, look)
         return number
 
-    def paint(self, number: int, look: Look, opacity: float | None = None) -> None:
-        """Give a row another look, and another opacity."""
+    def paint(
+        self,
+        number: int,
+        look: Look,
+        opacity: float | None = None,
+        shading: Shading | None = None,
+    ) -> None:
+        """Give a row another look, and another opacity and shading."""
         row = self._rows[number]
+        if shading is not None:
+            row["place"][3] = shading
         if opacity is not None:
             row["volume"][3] = opacity
         row["base"] = look.roughness, look.metallic, look.sheen, look.coat

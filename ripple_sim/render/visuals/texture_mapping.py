@@ -87,6 +87,15 @@ class TextureMapping:
         return coordinates
 
 
+def glow_texture(model: Any, visual: Visual, mapping: TextureMapping) -> int:
+    """Id of the flat texture of what a visual emits, laid like its own texture; -1 without."""
+    if visual.material < 0 or mapping.kind != MappingKind.FLAT_IMAGE:
+        return -1
+    texture = int(model.mat_texid[visual.material, mujoco.mjtTextureRole.mjTEXROLE_EMISSIVE])
+    is_flat = texture >= 0 and model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
+    return texture if is_flat else -1
+
+
 def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     """How MuJoCo (3.12 and later) lays the texture of a visual's material on it.
 

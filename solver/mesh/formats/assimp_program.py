@@ -16,6 +16,9 @@ import numpy as np
 # Number of an image of diffuse or base colour in assimp's list of a material's textures.
 _IMAGES = (12, 1)
 
+# The same of emission.
+_EMISSION_IMAGES = 4
+
 
 def main(source: str, target: str) -> None:
     """Read `source`, and write the triangles of all nodes and their materials to `target`."""
@@ -80,6 +83,8 @@ def _material(material: dict[str, Any]) -> dict[str, Any]:
     """Colour, opacity and image of a material of assimp."""
     color = material.get("COLOR_DIFFUSE", (1.0, 1.0, 1.0))
     textures = material.get("TEXTURES", {})
+    emission = material.get("COLOR_EMISSIVE", (0.0, 0.0, 0.0))
+    emission_images = list(textures.get(_EMISSION_IMAGES, ()))
     images: list[str] = []
     for number in _IMAGES:
         images += textures.get(number, ())
@@ -87,6 +92,8 @@ def _material(material: dict[str, Any]) -> dict[str, Any]:
         "color": [float(value) for value in color[:3]],
         "opacity": float(material.get("OPACITY", 1.0)),
         "image": images[0] if images else None,
+        "emission": [float(value) for value in emission[:3]],
+        "emission_image": emission_images[0] if emission_images else None,
     }
 
 

@@ -24,6 +24,8 @@ _OTHER_IMAGES = ("EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds", "KH
 
 _SPECULAR_GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 _TRANSFORM = "KHR_texture_transform"
+_STRENGTH = "KHR_materials_emissive_strength"
+_UNLIT = "KHR_materials_unlit"
 
 # What extensions of materials add and is not shown, in words.
 _NOT_SHOWN = {
@@ -35,7 +37,6 @@ _NOT_SHOWN = {
     "KHR_materials_sheen": "sheen",
     "KHR_materials_subsurface": "scattering",
     "KHR_materials_transmission": "transmission",
-    "KHR_materials_unlit": "colours without light",
     "KHR_materials_variants": "variants",
     "KHR_materials_volume": "volumes",
 }
@@ -81,6 +82,15 @@ def gltf_material(document: Document, index: int) -> GltfMaterial:
         roughness = _number(source.get("roughnessFactor", 1.0))
         gloss = _image(document, source.get("metallicRoughnessTexture"))
     image = _image(document, texture)
+    emissive = material.get("emissiveTexture")
+    emission = _emission(material)
+    not_shown = _not_shown(material)
+    if emissive is not None and texture is not None and any(emission):
+        uv_set, uv_transform = _coordinates(texture)
+        own_uv_set, own_transform = _coordinates(emissive)
+        if own_uv_set != uv_set or not np.array_equal(own_transform, uv_transform):
+            not_shown |= {"emission with texture coordinates of its own"}
+            emission = (0.0, 0.0, 0.0)
     red, green, blue, opacity = (_number(value) for value in [*color, 1.0, 1.0, 1.0, 1.0][:4])
     paint = Paint(
         color=(red, green, blue, opacity),
@@ -91,9 +101,21 @@ def gltf_material(document: Document, index: int) -> GltfMaterial:
         metallic=metallic,
         roughness=roughness,
         gloss=gloss,
+        emission=emission,
+        emission_image=_image(document, emissive) if any(emission) else None,
+        unlit=_UNLIT in extensions,
     )
-    uv_set, uv_transform = _coordinates(texture)
-    return GltfMaterial(paint, uv_set, uv_transform, _not_shown(material))
+    uv_set, uv_transform = _coordinates(emissive if texture is None else texture)
+    return GltfMaterial(paint, uv_set, uv_transform, not_shown)
+
+
+def _emission(material: dict[str, Any]) -> tuple[float, float, float]:
+    """Linear light that a material emits; what is brighter than 1 keeps its hue."""
+    factor = [_number(value) for value in [*material.get("emissiveFactor", ()), 0.0, 0.0, 0.0][:3]]
+    strength = material.get("extensions", {}).get(_STRENGTH, {}).get("emissiveStrength", 1.0)
+    light = max(_number(strength), 0.0) * np.array(factor)
+    red, green, blue = (light / max(float(light.max()), 1.0)).tolist()
+    return red, green, blue
 
 
 def _not_shown(material: dict[str, Any]) -> frozenset[str]:
@@ -102,8 +124,6 @@ def _not_shown(material: dict[str, Any]) -> frozenset[str]:
         words.add("normal maps")
     if "occlusionTexture" in material:
         words.add("occlusion")
-    if any(material.get("emissiveFactor", ())):
-        words.add("emission")
     return frozenset(words)
 
 

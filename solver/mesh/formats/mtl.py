@@ -38,6 +38,9 @@ _UP_TO = ("-o", "-s", "-t")
 # Keywords of what is not shown, in words.
 _NOT_SHOWN = {"bump": "normal maps", "map_bump": "normal maps", "norm": "normal maps"}
 
+# A name that may have blanks, up to its ending.
+_LIBRARY = re.compile(r"\S.*?\.mtl(?=\s|$)", re.IGNORECASE)
+
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
@@ -80,7 +83,7 @@ def read_libraries(
     lost = []
     for statement in statements:
         whole = found_file([obj_path.parent], _unquoted(statement))
-        names = [statement] if whole is not None else statement.split()
+        names = [statement] if whole is not None else _library_names(obj_path.parent, statement)
         for name in names:
             path = found_file([obj_path.parent], _unquoted(name))
             if path is None:
@@ -97,6 +100,13 @@ def read_libraries(
             materials.setdefault(name, material)
             materials.setdefault(name.lower(), material)
     return materials, lost
+
+
+def _library_names(folder: Path, statement: str) -> list[str]:
+    """Names of several libraries: behind each ending .mtl if there are such files, or at blanks."""
+    names = _LIBRARY.findall(statement)
+    is_found = [found_file([folder], _unquoted(name)) is not None for name in names]
+    return names if names and all(is_found) else statement.split()
 
 
 def _materials(path: Path, obj_folder: Path) -> Iterator[tuple[str, ObjMaterial]]:
@@ -130,10 +140,15 @@ def _material(said: dict[str, str], folders: list[Path]) -> ObjMaterial:
     if texture.image is not None and max(color) == 0:
         color = (1.0, 1.0, 1.0)
     opacity = _opacity(said)
+    emission_texture = _texture(said.get("map_ke", ""), folders)
+    emission = (0.0, 0.0, 0.0)
+    # some programs write an image of the emission and leave its colour black
+    if emission_texture.image is not None:
+        emission = (1.0, 1.0, 1.0)
+    if said.get("ke") and max(_color(said["ke"])) > 0:
+        emission = _color(said["ke"])
     has_opacity = opacity < 1 or opacity_texture.image is not None
     not_shown = {words for keyword, words in _NOT_SHOWN.items() if said.get(keyword)}
-    if said.get("ke") and max(_color(said["ke"])) > 0:
-        not_shown.add("emission")
     paint = Paint(
         color=(*color, opacity),
         image=texture.image,
@@ -142,8 +157,11 @@ def _material(said: dict[str, str], folders: list[Path]) -> ObjMaterial:
         alpha=BLEND if has_opacity else OPAQUE,
         metallic=_first_number(said.get("pm", "")),
         roughness=_first_number(said.get("pr", "")),
+        emission=emission,
+        emission_image=emission_texture.image,
     )
-    source = texture if texture.image is not None else opacity_texture
+    textures = (texture, opacity_texture, emission_texture)
+    source = next((each for each in textures if each.image is not None), texture)
     return ObjMaterial(paint, source.scale, source.offset, frozenset(not_shown))
 
 

@@ -143,19 +143,30 @@ def _soup(path: Path, arrays: dict[str, NDArray]) -> Soup:
 
 
 def _paint(path: Path, material: dict[str, Any]) -> Paint:
-    image = None
-    if material["image"] is not None:
-        name = str(material["image"])
-        source = found_file([path.parent], name) or path.parent / name.replace("\\", "/")
-        image = ImageSource(
-            source, name if not name.startswith("*") else f"inside the file ({name})"
-        )
+    image = _image(path, material["image"])
     red, green, blue = linear_light(np.array(material["color"])).tolist()
     if image is not None and max(red, green, blue) == 0:
         red = green = blue = 1.0
     # files of several programs say 0 where they mean nothing
     opacity = material["opacity"] or 1.0
-    return Paint((red, green, blue, opacity), image, alpha=BLEND if opacity < 1 else OPAQUE)
+    emission_red, emission_green, emission_blue = linear_light(
+        np.clip(material["emission"], 0.0, 1.0)
+    ).tolist()
+    return Paint(
+        (red, green, blue, opacity),
+        image,
+        alpha=BLEND if opacity < 1 else OPAQUE,
+        emission=(emission_red, emission_green, emission_blue),
+        emission_image=_image(path, material["emission_image"]),
+    )
+
+
+def _image(path: Path, name: str | None) -> ImageSource | None:
+    """The image of a name in a file, if there is one."""
+    if name is None:
+        return None
+    source = found_file([path.parent], name) or path.parent / name.replace("\\", "/")
+    return ImageSource(source, name if not name.startswith("*") else f"inside the file ({name})")
 
 
 def _parts(scene: trimesh.Scene) -> Soup:

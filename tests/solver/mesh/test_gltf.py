@@ -179,6 +179,28 @@ def test_materials_and_colours_belong_to_triangles(tmp_path: Path) -> None:
     np.testing.assert_allclose(looks.colors[2:], [[[32768 / 65535] * 3 + [1]] * 3] * 2)
 
 
+def test_emission_has_a_strength_and_the_coordinates_of_the_image(tmp_path: Path) -> None:
+    file = Gltf()
+    image = file.texture([[[255, 0, 0]]])
+    emission = {"emissiveFactor": [1, 0.5, 0], "emissiveTexture": {"index": image, "texCoord": 1}}
+    strong = {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}
+    base = {"baseColorTexture": {"index": image}}
+    materials = [
+        file.add("materials", **emission, extensions=strong),
+        file.add("materials", **emission, pbrMetallicRoughness=base),
+        file.add("materials", extensions={"KHR_materials_unlit": {}}),
+    ]
+    uv = file.accessor(SQUARE_UV)
+    coordinates = {"TEXCOORD_0": uv, "TEXCOORD_1": uv}
+    file.show(*(file.primitive(SQUARE + i, material=i, **coordinates) for i in materials))
+    looks = load_mesh(file.write(tmp_path / "a.glb")).looks
+    assert [paint.emission for paint in looks.paints] == [(1, 0.5, 0), (0, 0, 0), (0, 0, 0)]
+    assert looks.paints[0].emission_image is not None and looks.paints[2].unlit
+    assert looks.notes == (
+        "not shown of its materials: emission with texture coordinates of its own",
+    )
+
+
 def test_materials_have_specular_glossiness_wrap_modes_alpha_and_notes_of_losses(
     tmp_path: Path,
 ) -> None:
@@ -189,15 +211,15 @@ def test_materials_have_specular_glossiness_wrap_modes_alpha_and_notes_of_losses
         "materials",
         alphaMode="MASK",
         alphaCutoff=0.25,
-        emissiveFactor=[1, 0, 0],
-        extensions={"KHR_materials_pbrSpecularGlossiness": gloss, "KHR_materials_unlit": {}},
+        normalTexture={"index": texture},
+        extensions={"KHR_materials_pbrSpecularGlossiness": gloss, "KHR_materials_clearcoat": {}},
     )
     file.show(file.primitive(TEXCOORD_0=file.accessor(SQUARE_UV), material=material))
     looks = load_mesh(file.write(tmp_path / "a.glb")).looks
     (paint,) = looks.paints
     assert (paint.wrap, paint.alpha, paint.cutoff) == (("clamp", "mirror"), "mask", 0.25)
     assert paint.color == (1, 1, 1, 0.5) and paint.image.source.startswith(b"\x89PNG")
-    assert looks.notes == ("not shown of its materials: colours without light, emission",)
+    assert looks.notes == ("not shown of its materials: clear coats, normal maps",)
 
 
 def test_data_of_uris_and_of_files_beside(tmp_path: Path) -> None:

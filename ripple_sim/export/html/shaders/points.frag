@@ -5,5 +5,5 @@ void main() {
   vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
   vec3 point = (model * vec4(place.xyz, 1.0)).xyz, normal = mat3(model) * texelFetch(normals, ivec2(gl_FragCoord.xy), 0).xyz;
   if (open > 0.0 && dot(normal, eye - point) < 0.0) normal = -normal;
-  fragment = shownAt(point, normal, color, place.w);
+  fragment = shownAt(point, normal, color, vec3(0.0), place.w);
 }

@@ -1,9 +1,10 @@
-"""Half-transparent textures, and textures with holes, in the files of other programs."""
+"""Textures of a mesh file in the files of other programs: opacity, holes and emission."""
 
 import json
 import re
 import struct
 from pathlib import Path
+from typing import Any
 
 import pytest
 from gltf_files import SQUARE_UV, Gltf
@@ -28,6 +29,13 @@ def square_of(folder: Path, opacities: list[int]) -> Scene:
     return drop_scene(file.write(folder / "a.glb"), bodies=0)
 
 
+def materials_of(path: Path) -> list[dict[str, Any]]:
+    """The materials in the JSON of a .glb file."""
+    content = path.read_bytes()
+    (length,) = struct.unpack_from("<I", content, 12)
+    return json.loads(content[20 : 20 + length])["materials"]
+
+
 def test_usd_has_opacity_or_a_threshold_for_holes(tmp_path: Path) -> None:
     pxr = pytest.importorskip("pxr")
     thresholds = []
@@ -49,9 +57,7 @@ def test_glb_is_blended_or_a_mask(tmp_path: Path) -> None:
     for opacities in ([100, 255], [0, 255], [255, 255]):
         scene = square_of(tmp_path, opacities)
         export_scene(scene, tmp_path / "run.glb", OPTIONS)
-        content = (tmp_path / "run.glb").read_bytes()
-        (length,) = struct.unpack_from("<I", content, 12)
-        materials = json.loads(content[20 : 20 + length])["materials"]
+        materials = materials_of(tmp_path / "run.glb")
         (shown,) = (
             each for each in materials if "baseColorTexture" in each["pbrMetallicRoughness"]
         )
@@ -69,3 +75,19 @@ def test_pages_cast_shadows_of_what_is_more_than_half_opaque(tmp_path: Path) -> 
         meta = json.loads(target.group() + "}")
         seen.append((meta["clear"], meta["casting"] / meta["triangles"]))
     assert seen == [(True, 0.0), (False, pytest.approx(0.5, abs=0.1)), (False, 1.0)]
+
+
+def test_emission_has_an_image_of_its_own(tmp_path: Path) -> None:
+    pxr = pytest.importorskip("pxr")
+    file = Gltf()
+    material = file.add("materials", emissiveFactor=[1, 0, 0])
+    file.show(file.primitive(material=material))
+    scene = drop_scene(file.write(tmp_path / "a.glb"), bodies=0)
+    for name in ("glow.glb", "glow.usda", "glow.html"):
+        export_scene(scene, tmp_path / name, OPTIONS)
+    stage = pxr.Usd.Stage.Open(str(tmp_path / "glow.usda"))
+    mesh = next(each for each in stage.Traverse() if each.GetName() == "target")
+    bound, _ = pxr.UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()
+    assert bound.ComputeSurfaceSource()[0].GetInput("emissiveColor").HasConnectedSource()
+    assert any("emissiveTexture" in each for each in materials_of(tmp_path / "glow.glb"))
+    assert '"glow": 1' in (tmp_path / "glow.html").read_text(encoding="utf-8").replace(":1", ": 1")
