@@ -69,5 +69,5 @@ def _frame(scene: str) -> str:
     return (
         f'<iframe src="players/{scene}.html" title="{scene}: click or touch it to poke it" '
         'loading="lazy" allowfullscreen '
-        'style="border: 0; width: 100%; aspect-ratio: 16 / 9"></iframe>'
+        'style="border: 0; width: 100%; aspect-ratio: 16 / 9; min-height: 15rem"></iframe>'
     )

@@ -54,6 +54,7 @@ _SCRIPTS = (
     "groups.js",
     "lit_points.js",
     "floor.js",
+    "arrow.js",
     "drawing.js",
     "grid.js",
     "detail.js",

@@ -1,7 +1,4 @@
-"""Controls of the viewer: keys, an orbiting camera, sliders, screenshots and recordings.
-
-They are the same for the window, the web page and the help.
-"""
+"""Controls of the window: keys, an orbiting camera and sliders."""
 
 from __future__ import annotations
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import time
 import weakref
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +48,7 @@ class Window:
     size : (width, height)
         [pixels].
     off_screen : bool
-        Draw without a window: for the web page and for tests.
+        Draw without a window, for tests.
     folder : path
         Where screenshots and videos go.
 
@@ -66,8 +65,6 @@ class Window:
         Latest message to the user.
     seconds_drawing : float
         Time that drawing has taken so far [s].
-    render : callable
-        Draws the frame; a web page replaces it by its own, which also sends the frame.
 
     Raises
     ------
@@ -107,7 +104,6 @@ class Window:
             )
             for text, corner, size in (("", "upper_left", 9), (help_text(), "upper_right", 8))
         )
-        self.render: Callable[[], object] = self.plotter.render_window.Render
         self.update()
         self._sliders = add_sliders(self.plotter, session)
         self.closed = False
@@ -252,7 +248,7 @@ class Window:
             self._show_status()
         level(self.plotter.camera)
         self.plotter.renderer.ResetCameraClippingRange()
-        self.render()
+        self.plotter.render_window.Render()
         self.drawn = True
         self.seconds_drawing += time.perf_counter() - now
         if self.recorder.recording:
@@ -285,8 +281,8 @@ class Window:
         finally:
             self._closed_with()
 
-    def tick(self, draw: bool = True) -> bool:
-        """Advance by one frame, and draw it if `draw` is set.
+    def tick(self) -> bool:
+        """Advance by one frame, and draw it.
 
         Returns whether a new frame was drawn.
         """
@@ -297,7 +293,7 @@ class Window:
             moved = True
         if moved:
             self.update()
-        if self.drawn or not draw:
+        if self.drawn:
             return False
         self.draw()
         return True

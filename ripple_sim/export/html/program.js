@@ -26,7 +26,7 @@ function programControls(player, ui) {
   of("throw").onclick = () => throwBall(player, ui);
   of("record").onclick = () => player.send("record", {camera: cameraEntry(player)});
   of("share").onclick = () => player.send("share");
-  of("save").onclick = () => player.send("save", {camera: movedCamera(player)});
+  of("save").onclick = () => player.send("save", {camera: player.orbit ? roundedCamera(player) : {}});
   of("copy").onclick = () => copyCamera(player, ui);
   of("quit").onclick = () => player.send("quit");
   hideWhatIsNot(stream.commands, of);
@@ -93,9 +93,8 @@ function cameraEntry(player) {
   };
 }
 
-// The same for the program, in millimetres and tenths of degrees; empty while it is the scene's.
-function movedCamera(player) {
-  if (!player.orbit) return {};
+// The same in millimetres and tenths of degrees, with the angle of view.
+function roundedCamera(player) {
   const {lookat, distance, azimuth, elevation} = cameraEntry(player);
   const rounded = (x, digits) => Number(x.toFixed(digits));
   return {
@@ -108,16 +107,9 @@ function movedCamera(player) {
 }
 
 function copyCamera(player, ui) {
-  const {lookat, distance, azimuth, elevation} = cameraEntry(player);
-  const list = lookat.map(x => x.toFixed(3)).join(", ");
-  const lines = [
-    "[camera]",
-    `lookat = [${list}]`,
-    `distance = ${distance.toFixed(3)}`,
-    `azimuth = ${azimuth.toFixed(1)}`,
-    `elevation = ${elevation.toFixed(1)}`,
-    `fovy = ${player.meta.fovy.toFixed(1)}`,
-  ];
+  const entries = Object.entries(roundedCamera(player));
+  // JSON writes numbers and lists as TOML does
+  const lines = ["[camera]", ...entries.map(([name, value]) => `${name} = ${JSON.stringify(value)}`)];
   navigator.clipboard.writeText(lines.join("\n") + "\n").then(
     () => ui.say("The camera is in the clipboard."),
     () => ui.say(lines.join("  ")),
