@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,22 +17,44 @@ from ripple_sim.solver import Atlas
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 from ripple_sim.solver.mesh.queries import RayScene
 
-# samples along each side of a pixel
+# Samples along each side of a pixel.
 OVERSAMPLING = 2
 
 # Direction to the light: to the right, up, to the eye.
 _LIGHT = np.array([-0.45, 0.55, 0.7]) / np.linalg.norm([-0.45, 0.55, 0.7])
 
-# cells of the grid along the side of a square with the area of all charts
+# Brightness of a surface that is turned away from the light, and how much the light adds.
+_SHADOW = 0.42
+_LIGHT_STRENGTH = 0.68
+
+# Share of the brightness that remains where the surroundings hide the whole sky.
+_HIDDEN_BRIGHTNESS = 0.45
+
+# Strength and sharpness (Phong's exponent) of the sheen.
+_SHEEN = 0.10
+_SHEEN_EXPONENT = 40
+
+# Distance of the rays' origins from the middle of the mesh, whose radius is 1.
+_EYE_DISTANCE = 4
+
+# Half the side of an image over half the size of the mesh in it, and over the sphere's radius.
+_MESH_MARGIN = 1.02
+_SPHERE_MARGIN = 1.01
+
+# Cells of the grid along the side of a square with the area of all charts.
 _GRID_CELLS = 39
+
+# Distance from a line of the grid, and from a chart's border, up to which there is ink [texels],
+# and the opacities of the ink.
+_LINE_REACH = 0.04
+_BORDER_REACH = 0.09
+_LINE_OPACITY = 0.42
+_BORDER_OPACITY = 0.85
 
 _INK = np.array([0.10, 0.13, 0.20])
 
-# The belt of four charts from left to right, the second in the middle of the cross, and those above
-# and below it.
-BELT = (1, 3, 0, 2)
-ABOVE = 4
-BELOW = 5
+# Place of each chart of a cube in the unfolded cross: row from above and column.
+_CROSS = {1: (1, 0), 3: (1, 1), 0: (1, 2), 2: (1, 3), 4: (0, 1), 5: (2, 1)}
 
 # Gap between the squares of charts, over their side.
 _SQUARE_GAP = 0.12
@@ -76,17 +99,21 @@ def lit(
     openness: NDArray[np.float64],
     view: View,
 ) -> NDArray[np.float64]:
-    """Shade colours under a soft light from the upper left, with a little sheen.
+    """Shade colours [k, 3] under a soft light from the upper left, with a little sheen.
 
-    The shading is weak, so that the colours can be read.
+    `openness` [k] is the share of the sky that the surroundings leave open. The shading is weak, so
+    that the colours can be read.
     """
     local = normals @ view.axes.T
     local /= np.maximum(np.linalg.norm(local, axis=1, keepdims=True), 1e-9)
     diffuse = 0.5 + 0.5 * local @ _LIGHT
-    half = _LIGHT + np.array([0.0, 0.0, 1.0])
-    sheen = np.maximum(local @ (half / np.linalg.norm(half)), 0) ** 40
-    shade = (0.42 + 0.68 * diffuse) * (0.45 + 0.55 * openness)
-    return np.clip(colors * shade[:, None] + 0.10 * (sheen * openness)[:, None], 0, 1)
+    halfway = _LIGHT + np.array([0.0, 0.0, 1.0])  # between the light and the eye
+    halfway /= np.linalg.norm(halfway)
+    sheen = np.maximum(local @ halfway, 0) ** _SHEEN_EXPONENT
+    brightness = _SHADOW + _LIGHT_STRENGTH * diffuse
+    ambient = _HIDDEN_BRIGHTNESS + (1 - _HIDDEN_BRIGHTNESS) * openness
+    shade = brightness * ambient
+    return np.clip(colors * shade[:, None] + _SHEEN * (sheen * openness)[:, None], 0, 1)
 
 
 def screen(size: int, half_width: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -105,8 +132,7 @@ def antialiased(
     fine[seen, 3] = 1.0
     k = OVERSAMPLING
     coarse = fine.reshape(shape[0] // k, k, shape[1] // k, k, 4).mean(axis=(1, 3))
-    # colours are summed where something is seen only: undo the dilution, which alpha already
-    # expresses
+    # the mean of a pixel's colours counts empty samples as black; alpha has their share already
     coarse[..., :3] /= np.maximum(coarse[..., 3:], 1e-9)
     return np.clip(coarse, 0, 1)
 
@@ -139,39 +165,52 @@ class AtlasPainter:
 
     def mesh(self, view: View, size: int) -> NDArray[np.float64]:
         """RGBA image of the mesh, [size, size, 4], row 0 at the top."""
+        x, y = self._screen(view, size)
         right, up, eye = view.axes
-        plane = self._vertices @ np.stack([right, up], axis=1)
-        middle = (plane.min(axis=0) + plane.max(axis=0)) / 2
-        x, y = screen(size * OVERSAMPLING, float(np.ptp(plane, axis=0).max()) / 2 * 1.02)
-        origins = (middle[0] + x)[..., None] * right + (middle[1] + y)[..., None] * up + 4 * eye
-        triangle, _, *inside = self._scene.cast(origins.reshape(-1, 3), np.tile(-eye, (x.size, 1)))
+        origins = x[..., None] * right + y[..., None] * up + _EYE_DISTANCE * eye
+        directions = np.tile(-eye, (x.size, 1))
+        triangle, _, u, v = self._scene.cast(origins.reshape(-1, 3), directions)
         seen = np.flatnonzero(triangle >= 0)
         triangle = triangle[seen]
-        (u, v) = (each[seen].astype(np.float64) for each in inside)
+        u = u[seen].astype(np.float64)
+        v = v[seen].astype(np.float64)
         weights = np.stack([1 - u - v, u, v], axis=1)
         mesh = self._atlas.mesh
         corners = mesh.F[triangle]
         points = np.einsum("ki,kij->kj", weights, mesh.V[corners])
-        normals = np.einsum("ki,kij->kj", weights, self._corner_normals[triangle])
-        # an open surface shows its inner side too
-        flat = np.cross(
-            *np.moveaxis(self._vertices[corners[:, 1:]] - self._vertices[corners[:, :1]], 1, 0)
-        )
-        inner = flat @ eye < 0
-        baked = np.where(inner[:, None], self._baked[corners, 2], self._baked[corners, 0])
-        normals[inner] *= -1
         coordinates = self._atlas.chart_map.coordinates(mesh, triangle, points)
-        colors = self.paint(
-            *self._atlas.chart_map.chart_points(coordinates, self._atlas.resolution)
+        chart_points = self._atlas.chart_map.chart_points(coordinates, self._atlas.resolution)
+        colors = self.paint(*chart_points)
+        # an open surface shows its inner side too
+        shows_inner_side = self._area_vectors(corners) @ eye < 0
+        normals = np.einsum("ki,kij->kj", weights, self._corner_normals[triangle])
+        normals[shows_inner_side] *= -1
+        openness_at_corners = np.where(
+            shows_inner_side[:, None], self._baked[corners, 2], self._baked[corners, 0]
         )
-        return antialiased(
-            x.shape, seen, lit(colors, normals, np.einsum("ki,ki->k", weights, baked), view)
-        )
+        openness = np.einsum("ki,ki->k", weights, openness_at_corners)
+        return antialiased(x.shape, seen, lit(colors, normals, openness, view))
+
+    def _screen(self, view: View, size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Places to the right and up of all samples of an image that holds the whole mesh."""
+        right, up, _ = view.axes
+        plane = self._vertices @ np.stack([right, up], axis=1)
+        middle = (plane.min(axis=0) + plane.max(axis=0)) / 2
+        half_width = float(np.ptp(plane, axis=0).max()) / 2 * _MESH_MARGIN
+        x, y = screen(size * OVERSAMPLING, half_width)
+        return middle[0] + x, middle[1] + y
+
+    def _area_vectors(self, corners: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Normals [k, 3] of triangles with vertices [k, 3], twice as long as their areas."""
+        first = self._vertices[corners[:, 0]]
+        second = self._vertices[corners[:, 1]]
+        third = self._vertices[corners[:, 2]]
+        return np.cross(second - first, third - first)
 
     def paint(
         self, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Colours [k, 3] of places on the charts, each [k]; override it to paint others."""
+        """Colours [k, 3] of points on the charts; a subclass may paint other colours."""
         return self.grid(chart, row, column, on_surface=True)
 
     def grid(
@@ -182,40 +221,44 @@ class AtlasPainter:
         *,
         on_surface: bool,
     ) -> NDArray[np.float64]:
-        """Colours of points on the charts [k, 3].
+        """Colours [k, 3] of points on the charts, with fine lines between cells of texels.
 
-        They are the colours of the texels, under a grid of fine lines and the borders of the
-        charts.
-
-        The lines are equally wide on the surface, or else in the charts.
+        The points are a chart [k], and a row and a column [k] in units of texels. The lines and the
+        borders of charts are equally wide on the surface, or else on the charts.
         """
         n = self._atlas.resolution
-        i, j = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
+        i = np.clip(np.rint(row).astype(np.int64), 0, n - 1)
+        j = np.clip(np.rint(column).astype(np.int64), 0, n - 1)
         colors = self._colors[chart, i, j]
         if not self._with_grid:
             return colors
         cells = min(max(1, round(_GRID_CELLS / len(self._colors) ** 0.5)), n)
-        along = np.stack([row, column]) + 0.5
-        scale = cells / n * (self._widths[:, chart, i, j] if on_surface else 1.0)
-        to_line = (np.abs((along * (cells / n) + 0.5) % 1 - 0.5) * (n / cells) * scale).min(axis=0)
-        to_edge = (np.minimum(along, n - along) * scale).min(axis=0)
-        ink = np.where(to_edge < 0.09, 0.85, np.where(to_line < 0.04, 0.42, 0.0))[:, None]
+        along = np.stack([row, column]) + 0.5  # from the chart's edge [texels], [2, k]
+        width = self._widths[:, chart, i, j] if on_surface else 1.0
+        scale = cells / n * width  # a texel is as wide as this share of a cell
+        cells_to_line = np.abs((along * (cells / n) + 0.5) % 1 - 0.5)
+        to_line = (cells_to_line * (n / cells) * scale).min(axis=0)
+        to_border = (np.minimum(along, n - along) * scale).min(axis=0)
+        line = np.where(to_line < _LINE_REACH, _LINE_OPACITY, 0.0)
+        ink = np.where(to_border < _BORDER_REACH, _BORDER_OPACITY, line)[:, None]
         return colors * (1 - ink) + _INK * ink
 
     @functools.cached_property
     def _widths(self) -> NDArray[np.float64]:
-        """Width of rows and columns on the surface, relative to an even spread, [2, C, n, n]."""
+        """Width of rows and columns at texels on the surface, over an even spread, [2, C, n, n]."""
         with_halo = self._atlas.texels.halo_positions
         areas = self._atlas.areas
-        own = with_halo[:, 1:-1, 1:-1]
+        texels = with_halo[:, 1:-1, 1:-1]
         even = np.sqrt(areas.mean())
 
         def width(before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
-            sides = np.stack([np.linalg.norm(each - own, axis=-1) for each in (before, after)])
-            side = np.where(np.isfinite(sides), sides, 0.0).sum(axis=0) / np.isfinite(sides).sum(
-                axis=0
-            ).clip(1)
-            return areas / np.maximum(side, 1e-6 * even)
+            """Area over the mean distance to the neighbours on both sides; a rim has one."""
+            neighbours = (before, after)
+            sides = np.stack([np.linalg.norm(other - texels, axis=-1) for other in neighbours])
+            exists = np.isfinite(sides)
+            total = np.where(exists, sides, 0.0).sum(axis=0)
+            mean_side = total / exists.sum(axis=0).clip(1)
+            return areas / np.maximum(mean_side, 1e-6 * even)
 
         rows = width(with_halo[:, 1:-1, :-2], with_halo[:, 1:-1, 2:])
         columns = width(with_halo[:, :-2, 1:-1], with_halo[:, 2:, 1:-1])
@@ -226,7 +269,7 @@ def sphere_image(
     painter: AtlasPainter, resolution: int, view: View, size: int
 ) -> NDArray[np.float64]:
     """RGBA image [size, size, 4] of the unit sphere that the cube layout maps a mesh onto."""
-    x, y = screen(size * OVERSAMPLING, 1.01)
+    x, y = screen(size * OVERSAMPLING, _SPHERE_MARGIN)
     seen = np.flatnonzero((x**2 + y**2).ravel() < 1)
     local = np.stack([x.ravel()[seen], y.ravel()[seen]], axis=1)
     local = np.column_stack([local, np.sqrt(1 - (local**2).sum(axis=1))])
@@ -241,13 +284,11 @@ def cross(painter: AtlasPainter, resolution: int, size: int) -> NDArray[np.float
     Four charts are in the middle row, with one above and one below.
     """
     image = np.zeros((3 * size, 4 * size, 4))
-    for chart, i, k in [(chart, 1, k) for k, chart in enumerate(BELT)] + [
-        (ABOVE, 0, 1),
-        (BELOW, 2, 1),
-    ]:
-        image[i * size : (i + 1) * size, k * size : (k + 1) * size] = _square(
-            painter, chart, resolution, size
-        )
+    for chart, (row, column) in _CROSS.items():
+        top = row * size
+        left = column * size
+        square = _square(painter, chart, resolution, size)
+        image[top : top + size, left : left + size] = square
     return image
 
 
@@ -255,21 +296,29 @@ def squares(
     painter: AtlasPainter, shape: tuple[int, int, int], width: int, height: int
 ) -> NDArray[np.float64]:
     """RGBA image, at most [height, width, 4], of all charts side by side from the upper left."""
-    count, n, _ = shape
-    columns = max(range(1, count + 1), key=lambda k: min(width / k, height / -(-count // k)))
-    rows = -(-count // columns)
-    pitch = max(int(min(width / columns, height / rows)), 2)
+    count, resolution, _ = shape
+
+    def pitch_with(columns: int) -> float:
+        """Largest distance between squares [pixels]."""
+        rows = math.ceil(count / columns)
+        return min(width / columns, height / rows)
+
+    columns = max(range(1, count + 1), key=pitch_with)
+    rows = math.ceil(count / columns)
+    pitch = max(int(pitch_with(columns)), 2)
     size = max(round(pitch * (1 - _SQUARE_GAP)), 1)
     image = np.zeros((rows * pitch, columns * pitch, 4))
     for chart in range(count):
-        i, k = divmod(chart, columns)
-        image[i * pitch : i * pitch + size, k * pitch : k * pitch + size] = _square(
-            painter, chart, n, size
-        )
+        row, column = divmod(chart, columns)
+        top = row * pitch
+        left = column * pitch
+        square = _square(painter, chart, resolution, size)
+        image[top : top + size, left : left + size] = square
     return image
 
 
 def _square(painter: AtlasPainter, chart: int, resolution: int, size: int) -> NDArray[np.float64]:
+    """RGBA image [size, size, 4] of one chart, row 0 of the chart at the bottom."""
     fine = size * OVERSAMPLING
     place = (np.arange(fine) + 0.5) / fine * resolution - 0.5
     row, column = np.meshgrid(place[::-1], place, indexing="ij")

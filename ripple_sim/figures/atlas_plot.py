@@ -28,19 +28,35 @@ _HUE_STEP = 5
 _LIGHTNESS = (0.74, 0.66)
 _SATURATION = 0.62
 
+# Places of the images: left, bottom, width and height, as shares of the figure.
+_FRONT_PLACE = (0.025, 0.05, 0.37, 0.82)
+_BACK_PLACE = (0.42, 0.50, 0.20, 0.38)
+_SMALL_PLACE = (0.42, 0.07, 0.20, 0.355)
+_CHARTS_PLACE = (0.635, 0.455, 0.35, 0.47)
+_HISTOGRAM_PLACE = (0.655, 0.300, 0.31, 0.105)
+
+# Places of the numbers: left of the two columns, and the height of the first row, of the name under
+# a number and from row to row, as shares of the figure.
+_QUALITY_COLUMNS = (0.655, 0.83)
+_QUALITY_ROWS = 3
+_QUALITY_TOP = 0.196
+_NAME_TOP = 0.170
+_QUALITY_PITCH = 0.062
+
 
 def texel_stretch(atlas: Atlas) -> NDArray[np.float64]:
-    """Stretch at every texel, [C, n, n]: sqrt(real area over even share).
+    """Stretch at every texel, [C, n, n]: sqrt(share of the area over even share).
 
-    In the cube layout the even share is that of the texel on the sphere, in others the same for all
-    texels.
+    In the cube layout the even share of a texel is its share of the sphere. In other layouts it is
+    the same for all texels.
     """
-    share = (
-        sphere_atlas(1.0, atlas.resolution).areas
-        if atlas.layout == "cube"
-        else np.ones_like(atlas.areas)
-    )
-    return np.sqrt((atlas.areas / atlas.areas.sum()) / (share / share.sum()))
+    if atlas.layout == "cube":
+        even_areas = sphere_atlas(1.0, atlas.resolution).areas
+    else:
+        even_areas = np.ones_like(atlas.areas)
+    area_share = atlas.areas / atlas.areas.sum()
+    even_share = even_areas / even_areas.sum()
+    return np.sqrt(area_share / even_share)
 
 
 def stretch_shade(stretch: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -90,40 +106,43 @@ def plot_atlas(
     front = View(up=up)
     back = View(azimuth=View.azimuth + 180, up=up)
     if atlas.layout == "cube":
-        large = painter
-        small = (sphere_image(painter, atlas.resolution, front, 380), "on the sphere")
-        page = cross(painter, atlas.resolution, 160), "the six charts, unfolded"
+        mesh_painter = painter
+        small_image = sphere_image(painter, atlas.resolution, front, 380)
+        small_caption = "on the sphere"
+        charts_image = cross(painter, atlas.resolution, 160)
+        charts_caption = "the six charts, unfolded"
     else:
-        colors = np.broadcast_to(
-            chart_colors(atlas.texels.topology)[:, None, None], (*atlas.texels.shape, 3)
-        )
-        large = AtlasPainter(atlas, colors)
-        small = (painter.mesh(front, 380), "stretch")
-        page = (
-            squares(painter, atlas.texels.shape, 672, 508),
-            f"the {len(colors)} charts, side by side",
-        )
-    show(figure, (0.025, 0.05, 0.37, 0.82), large.mesh(front, 800))
-    show(figure, (0.42, 0.50, 0.20, 0.38), large.mesh(back, 400), "the other side")
-    show(figure, (0.42, 0.07, 0.20, 0.355), *small)
-    show(figure, (0.635, 0.455, 0.35, 0.47), *page)
-    _histogram(figure.add_axes((0.655, 0.300, 0.31, 0.105)), stretch, atlas.areas)
-    _figures(figure, atlas)
+        color_by_chart = chart_colors(atlas.texels.topology)
+        colors = np.broadcast_to(color_by_chart[:, None, None], (*atlas.texels.shape, 3))
+        mesh_painter = AtlasPainter(atlas, colors)
+        small_image = painter.mesh(front, 380)
+        small_caption = "stretch"
+        charts_image = squares(painter, atlas.texels.shape, 672, 508)
+        charts_caption = f"the {len(colors)} charts, side by side"
+    show(figure, _FRONT_PLACE, mesh_painter.mesh(front, 800))
+    show(figure, _BACK_PLACE, mesh_painter.mesh(back, 400), "the other side")
+    show(figure, _SMALL_PLACE, small_image, small_caption)
+    show(figure, _CHARTS_PLACE, charts_image, charts_caption)
+    _draw_histogram(figure.add_axes(_HISTOGRAM_PLACE), stretch, atlas.areas)
+    _write_quality(figure, atlas)
     save_plot(figure, path)
 
 
-def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
-    """Share of the surface over stretch, in the colours of the images, as their legend."""
+def _draw_histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
+    """Share of the surface over stretch, in the colours of the images: it is their legend too."""
     bins = np.geomspace(1 / STRETCH_RANGE, STRETCH_RANGE, 121)
-    share, _ = np.histogram(stretch.clip(bins[0], bins[-1]), bins, weights=areas)
-    colors = STRETCH_COLORS(stretch_shade(np.sqrt(bins[1:] * bins[:-1])))  # those of the middles
-    axes.bar(
-        bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none"
-    )
-    axes.stairs(share / share.max(), bins, color=FAINT, linewidth=0.7)  # pale bars need an outline
-    axes.bar(
-        bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none"
-    )
+    area_in_bin, _ = np.histogram(stretch.clip(bins[0], bins[-1]), bins, weights=areas)
+    heights = area_in_bin / area_in_bin.max()
+    middles = np.sqrt(bins[1:] * bins[:-1])
+    bars = {
+        "width": np.diff(bins),
+        "align": "edge",
+        "color": STRETCH_COLORS(stretch_shade(middles)),
+        "edgecolor": "none",
+    }
+    axes.bar(bins[:-1], heights, **bars)
+    axes.stairs(heights, bins, color=FAINT, linewidth=0.7)  # pale bars need an outline
+    axes.bar(bins[:-1], -0.14, bottom=-0.03, **bars)  # the strip of colours below
     axes.set_xscale("log")
     axes.set_xlim(bins[0], bins[-1])
     axes.set_ylim(-0.17, 1.02)
@@ -138,26 +157,30 @@ def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float
     axes.spines[:].set_visible(False)
 
 
-def _figures(figure: Figure, atlas: Atlas) -> None:
-    quality = atlas.quality()
-    even = np.sqrt(atlas.mesh.area / atlas.areas.size)
-    shown = {
+def _write_quality(figure: Figure, atlas: Atlas) -> None:
+    """Write the numbers of `Atlas.quality`; a number that the layout does not know is a dash."""
+    even_edge = np.sqrt(atlas.mesh.area / atlas.areas.size)  # [m]
+    # how to write a number from the entries of the quality, times a factor
+    entries = {
         "folded triangles": ("{flipped}", 1.0),
         "area starved (stretch over 4)": ("{starved:.2f} %", 100.0),
         "texel area / mesh area": ("{coverage:.4f}", 1.0),
         "stretch, median": ("{q50:.2f}", 1.0),
         "stretch, 0.1 % to 99.9 %": ("{q001:.2f} to {q999:.2f}", 1.0),
-        "texel edges / even grid": ("{edge_min:.2f} to {edge_max:.2f}", 1 / even),
+        "texel edges / even grid": ("{edge_min:.2f} to {edge_max:.2f}", 1 / even_edge),
     }
-    for index, (name, (form, unit)) in enumerate(shown.items()):
-        left = (0.655, 0.83)[index // 3]
-        k = index % 3
-        values = {key: value if unit == 1.0 else value * unit for key, value in quality.items()}
+    quality = atlas.quality()
+    for index, (name, (form, factor)) in enumerate(entries.items()):
+        values = quality
+        if factor != 1.0:
+            values = {key: value * factor for key, value in quality.items()}
         try:
             text = form.format(**values)
-        except KeyError:  # the layout does not know it
+        except KeyError:
             text = "-"
-        figure.text(
-            left, 0.196 - 0.062 * k, text, fontsize=16, fontweight="bold", color=TEXT, va="center"
-        )
-        figure.text(left, 0.170 - 0.062 * k, name, fontsize=11, color=FAINT, va="center")
+        column, row = divmod(index, _QUALITY_ROWS)
+        left = _QUALITY_COLUMNS[column]
+        top = _QUALITY_TOP - _QUALITY_PITCH * row
+        figure.text(left, top, text, fontsize=16, fontweight="bold", color=TEXT, va="center")
+        name_top = _NAME_TOP - _QUALITY_PITCH * row
+        figure.text(left, name_top, name, fontsize=11, color=FAINT, va="center")

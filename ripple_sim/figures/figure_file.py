@@ -13,17 +13,21 @@ from ripple_sim.solver import AtlasError
 from ripple_sim.solver.files import atomic_write, final_path
 
 _ENDINGS = (".png", ".jpg", ".pdf", ".svg")
+
+# Size of a figure [inches], and its pixels an inch.
+_SIZE = (16, 9)
 _DPI = 120
 
-
-TEXT, FAINT = "#1b2432", "#6b7685"
+# Colours of text, and of text that says less.
+TEXT = "#1b2432"
+FAINT = "#6b7685"
 
 
 def check_plot_path(path: str | Path, overwrite: bool = True) -> None:
     """Check that a figure can be written.
 
-    Raises `AtlasError` if the ending is unknown, the folder is missing, or another file is in the
-    way.
+    Raises `AtlasError` if the ending is unknown, the folder is missing, or a file that was not made
+    by ripple-sim would be replaced without `overwrite`.
     """
     path = Path(path)
     if path.suffix.lower() not in _ENDINGS:
@@ -49,7 +53,7 @@ def check_plot_path(path: str | Path, overwrite: bool = True) -> None:
 
 def dressed(title: str, subtitle: str) -> Figure:
     """An empty figure with a title."""
-    figure = Figure(figsize=(16, 9), dpi=_DPI, facecolor="white")
+    figure = Figure(figsize=_SIZE, dpi=_DPI, facecolor="white")
     figure.text(0.03, 0.945, title, fontsize=25, fontweight="bold", color=TEXT, va="center")
     figure.text(0.03, 0.903, subtitle, fontsize=12.5, color=FAINT, va="center")
     return figure
@@ -58,7 +62,7 @@ def dressed(title: str, subtitle: str) -> Figure:
 def show(
     figure: Figure, place: tuple[float, float, float, float], image: NDArray, caption: str = ""
 ) -> None:
-    """Put an image at a place of a figure, left, bottom, width, height in shares of it."""
+    """Put an image into a figure, at left, bottom, width and height as shares of the figure."""
     axes = figure.add_axes(place)
     axes.imshow(image, interpolation="antialiased")
     axes.set_axis_off()
@@ -76,19 +80,26 @@ def show(
 
 
 def save_plot(figure: Figure, path: str | Path) -> None:
-    """Write a figure, marked as made here, whole or not at all.
+    """Write a figure, with the mark that ripple-sim made it, whole or not at all.
 
     Raises `AtlasError` if that fails.
     """
     ending = Path(path).suffix.lower()
-    told: dict[str, Any] = {"Software" if ending == ".png" else "Creator": MARK}
-    mark: dict[str, Any] = {"metadata": told | ({"Date": None} if ending == ".svg" else {})}
-    if ending == ".jpg":
-        mark = {"pil_kwargs": {"comment": MARK.encode()}}
     try:
         with atomic_write(Path(path)) as unfinished:
-            figure.savefig(unfinished, format=ending[1:], dpi=_DPI, **mark)
+            figure.savefig(unfinished, format=ending[1:], dpi=_DPI, **_mark_options(ending))
     except OSError as error:
         raise AtlasError(
             f"plot file {str(path)!r} cannot be written: {error.strerror or error}"
         ) from error
+
+
+def _mark_options(ending: str) -> dict[str, Any]:
+    """Options of `savefig` that write into a file that ripple-sim made it."""
+    if ending == ".png":
+        return {"metadata": {"Software": MARK}}
+    if ending == ".jpg":
+        return {"pil_kwargs": {"comment": MARK.encode()}}
+    if ending == ".svg":
+        return {"metadata": {"Creator": MARK, "Date": None}}  # the same figure, the same file
+    return {"metadata": {"Creator": MARK}}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure  # without pyplot, which would look for a display
 from numpy.typing import NDArray
 
 from ripple_sim.render.visuals.corners import corner_normals
@@ -28,20 +30,27 @@ _MAX_WAVE_HEIGHT = 0.12
 # Greatest thickness of a sheet over its size.
 _MAX_SHEET_THICKNESS = 0.2
 
-# [degrees]: sheets are shown from higher up than bodies
+# Elevation of the eye above a sheet [degrees]: sheets are shown from higher up than bodies.
 _SHEET_ELEVATION = 32.0
 
 # Place of all pictures: left, bottom, width and height, as shares of the figure.
 _PLACE = (0.03, 0.02, 0.94, 0.85)
 
 # Share of the width that the pictures fill.
-_FILLED = 0.92
+_FILLED_WIDTH = 0.92
 
-# [pixels]: height of a caption
-_CAPTION = 54
+# Height of a caption [pixels].
+_CAPTION_HEIGHT = 54
 
-# [pixels]: largest picture
-_LARGEST = 640
+# Size of a picture, at most [pixels].
+_MAX_PICTURE_SIZE = 640
+
+# Side of a picture as it is drawn over the side of a square with its share of the place: margins
+# are cut off later.
+_PICTURE_SIZE = 1.2
+
+# Significant digits of a frequency.
+_FREQUENCY_DIGITS = 4
 
 
 class ModePainter(AtlasPainter):
@@ -53,30 +62,35 @@ class ModePainter(AtlasPainter):
     def __init__(self, atlas: Atlas) -> None:
         fine = texel_atlas(atlas.texels)
         super().__init__(fine, np.ones((*atlas.areas.shape, 3)), with_grid=False)
-        self._rest = self._vertices
+        self._vertices_at_rest = self._vertices  # in units of the radius
         self._normals = fine.mesh.vertex_normals
-        self._at_vertices = fine.sampling_matrix(fine.mesh.V)
-        self._wave_matrix = atlas.stiffness()
-        # as a share of the radius, in which the painter's vertices are
-        self._radius = np.linalg.norm(np.ptp(fine.mesh.V, axis=0)) / np.linalg.norm(
-            np.ptp(self._rest, axis=0)
-        )
-        self._highest = _MAX_SHEET_HEIGHT if _is_sheet(atlas) else _MAX_BODY_HEIGHT
+        self._at_vertices = fine.sampling_matrix(fine.mesh.V)  # from texels to vertices
+        self._stiffness = atlas.stiffness()
+        size = np.linalg.norm(np.ptp(fine.mesh.V, axis=0))
+        size_in_radii = np.linalg.norm(np.ptp(self._vertices_at_rest, axis=0))
+        self._radius = size / size_in_radii  # [m]
+        self._max_height = _MAX_SHEET_HEIGHT if _is_sheet(atlas) else _MAX_BODY_HEIGHT
         self._shape = np.zeros(atlas.areas.size)
 
     def mode(self, shape: NDArray[np.float64], view: View, size: int) -> NDArray[np.float64]:
-        """RGBA image [size, size, 4] of a shape [C, n, n], of at most 1."""
-        flat = self._shape = shape.ravel()
-        wave_number = np.sqrt(
-            flat @ (self._wave_matrix @ flat) / (flat @ (self._atlas.areas.ravel() * flat))
-        )
-        wave = 2 * np.pi / max(wave_number * self._radius, 1e-9)
-        height = min(self._highest, _MAX_WAVE_HEIGHT * wave) * (self._at_vertices @ flat)
-        self._vertices = self._rest + height[:, None] * self._normals
+        """RGBA image [size, size, 4] of the shape of a mode, [C, n, n] between -1 and 1."""
+        self._shape = shape.ravel()
+        height = self._height() * (self._at_vertices @ self._shape)
+        self._vertices = self._vertices_at_rest + height[:, None] * self._normals
         F = self._atlas.mesh.F
         self._scene = RayScene(self._vertices, F)
         self._corner_normals = corner_normals(self._vertices, F)
         return self.mesh(view, size)
+
+    def _height(self) -> float:
+        """Greatest height of the mode that is drawn, in units of the radius."""
+        shape = self._shape
+        areas = self._atlas.areas.ravel()
+        # Rayleigh's quotient of the Laplacian: 0 for a mode that is the same everywhere
+        squared = shape @ (self._stiffness @ shape) / (shape @ (areas * shape))
+        wave_number = np.sqrt(max(squared, 0.0))
+        wavelength = 2 * np.pi / max(wave_number * self._radius, 1e-9)
+        return min(self._max_height, _MAX_WAVE_HEIGHT * wavelength)
 
     def paint(
         self, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
@@ -108,48 +122,16 @@ def plot_modes(
         If the ending is unknown or the file cannot be written.
     """
     check_plot_path(path)
-    thin = "xyz"[np.ptp(atlas.mesh.V, axis=0).argmin()]
-    view = (
-        View(up=thin, elevation=_SHEET_ELEVATION)
-        if _is_sheet(atlas) and thin != "x"
-        else View(up=up)
-    )
-    painter = ModePainter(atlas)
     figure = dressed(title, subtitle)
-    left, bottom, width, height = _PLACE
-    across, along = figure.get_size_inches() * figure.dpi
-    count = len(found.shapes)
-    size = round(min(_LARGEST, 1.2 * np.sqrt(width * across * height * along / count)))
-    images = np.stack([painter.mode(shape, view, size) for shape in found.shapes])
-    seen = images[..., 3].max(axis=0)
-    rows, columns = (np.flatnonzero(seen.max(axis=axis)) for axis in (1, 0))
-    # without the margin that all have
-    images = images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    aspect = images.shape[1] / images.shape[2]
-
-    def scale(columns: int) -> float:
-        """Width of the pictures [pixels]."""
-        return min(
-            _FILLED * width * across / columns,
-            (height * along / -(-count // columns) - _CAPTION) / aspect,
-        )
-
-    most = max(range(1, count + 1), key=scale)  # pictures side by side
-    pitch = width / most
-    box = scale(most) / across
-    for k, image in enumerate(images):
-        row, column = divmod(k, most)
-        x = left + (column + 0.5) * pitch
-        y = bottom + height * (1 - row / -(-count // most))
-        tall = aspect * box * across / along
-        show(figure, (x - box / 2, y - tall, box, tall), image)
-        frequency = found.frequencies[k]
-        digits = max(0, 3 - int(np.floor(np.log10(frequency)))) if frequency else 0  # four in all
-        caption = f"{k + 1}:  {frequency:.{digits}f} Hz"
+    images = _pictures(atlas, found, _view(atlas, up), _max_picture_size(figure, len(found.shapes)))
+    places = _picture_places(figure, images.shape[1] / images.shape[2], len(images))
+    for k, (image, place) in enumerate(zip(images, places, strict=True)):
+        show(figure, place, image)
+        left, bottom, width, _ = place
         figure.text(
-            x,
-            y - tall - _CAPTION / 3 / along,
-            caption,
+            left + width / 2,
+            bottom - _CAPTION_HEIGHT / 3 / (figure.get_figheight() * figure.dpi),
+            f"{k + 1}:  {_frequency_text(found.frequencies[k])}",
             fontsize=12,
             color=TEXT,
             ha="center",
@@ -158,6 +140,83 @@ def plot_modes(
     save_plot(figure, path)
 
 
+def _view(atlas: Atlas, up: str) -> View:
+    """The view of all modes: a sheet lies down."""
+    thin_axis = "xyz"[np.ptp(atlas.mesh.V, axis=0).argmin()]
+    if _is_sheet(atlas) and thin_axis != "x":
+        return View(up=thin_axis, elevation=_SHEET_ELEVATION)
+    return View(up=up)
+
+
+def _max_picture_size(figure: Figure, count: int) -> int:
+    """Size at which to draw each of `count` pictures [pixels]."""
+    area = _place_width(figure) * _place_height(figure)
+    return round(min(_MAX_PICTURE_SIZE, _PICTURE_SIZE * np.sqrt(area / count)))
+
+
+def _place_width(figure: Figure) -> float:
+    """Width of the place of all pictures [pixels]."""
+    return _PLACE[2] * figure.get_figwidth() * figure.dpi
+
+
+def _place_height(figure: Figure) -> float:
+    """Height of the place of all pictures [pixels]."""
+    return _PLACE[3] * figure.get_figheight() * figure.dpi
+
+
+def _pictures(atlas: Atlas, found: Modes, view: View, size: int) -> NDArray[np.float64]:
+    """RGBA images of all modes, [k, height, width, 4], without the margin that all have."""
+    painter = ModePainter(atlas)
+    images = np.stack([painter.mode(shape, view, size) for shape in found.shapes])
+    is_seen = images[..., 3].max(axis=0)
+    rows = np.flatnonzero(is_seen.max(axis=1))
+    columns = np.flatnonzero(is_seen.max(axis=0))
+    return images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+
+
+def _picture_places(
+    figure: Figure, aspect: float, count: int
+) -> list[tuple[float, float, float, float]]:
+    """Left, bottom, width and height of `count` pictures, as shares of the figure.
+
+    `aspect` is the height of a picture over its width.
+    """
+    place_width = _place_width(figure)
+    place_height = _place_height(figure)
+
+    def picture_width(columns: int) -> float:
+        """Width of a picture [pixels], if there are so many side by side."""
+        rows = math.ceil(count / columns)
+        room_across = _FILLED_WIDTH * place_width / columns
+        room_down = place_height / rows - _CAPTION_HEIGHT
+        return min(room_across, room_down / aspect)
+
+    columns = max(range(1, count + 1), key=picture_width)
+    rows = math.ceil(count / columns)
+    left, bottom, all_width, all_height = _PLACE
+    figure_width = figure.get_figwidth() * figure.dpi
+    figure_height = figure.get_figheight() * figure.dpi
+    width = picture_width(columns) / figure_width
+    height = aspect * width * figure_width / figure_height
+    places = []
+    for k in range(count):
+        row, column = divmod(k, columns)
+        middle = left + (column + 0.5) * all_width / columns
+        top = bottom + all_height * (1 - row / rows)
+        places.append((middle - width / 2, top - height, width, height))
+    return places
+
+
+def _frequency_text(frequency: float) -> str:
+    """A frequency [Hz] with four significant digits, but whole above these."""
+    if not frequency:
+        return "0 Hz"
+    digits_before_point = int(np.floor(np.log10(frequency))) + 1
+    decimals = max(0, _FREQUENCY_DIGITS - digits_before_point)
+    return f"{frequency:.{decimals}f} Hz"
+
+
 def _is_sheet(atlas: Atlas) -> bool:
+    """Whether the surface is flat, so that its modes may be drawn high."""
     extents = np.ptp(atlas.mesh.V, axis=0)
     return bool(extents.min() < _MAX_SHEET_THICKNESS * extents.max())

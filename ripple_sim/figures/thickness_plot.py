@@ -20,8 +20,8 @@ _THICKNESS_COLORS = colormaps["viridis"]
 # Quantiles of the thickness at the ends of the colours.
 _SHOWN_QUANTILES = (0.005, 0.97)
 
-# Least range of the colours over the greatest thickness: a layer may be as thick everywhere.
-_MIN_RANGE = 1e-9
+# Range of the colours over the greatest thickness, at least: a layer may be even.
+_MIN_COLOR_RANGE = 1e-9
 
 # Bars of the histogram.
 _BARS = 100
@@ -40,22 +40,24 @@ def plot_thickness(
 ) -> None:
     """Write a figure of the thickness [m] of a layer, [C, n, n], from `thickness_map`.
 
-    Otherwise it is like `plot_atlas`.
+    The other arguments are those of `plot_atlas`.
     """
     check_plot_path(path)
     low, high = np.quantile(thickness, _SHOWN_QUANTILES)
-    shade = np.clip((thickness - low) / max(high - low, _MIN_RANGE * high), 0, 1)
+    shade = np.clip((thickness - low) / max(high - low, _MIN_COLOR_RANGE * high), 0, 1)
     painter = AtlasPainter(atlas, _THICKNESS_COLORS(shade)[..., :3], with_grid=False)
     figure = dressed(title, subtitle)
     front = View(up=up)
     back = View(azimuth=View.azimuth + 180, up=up)
     show(figure, (0.03, 0.17, 0.45, 0.70), painter.mesh(front, 800))
     show(figure, (0.52, 0.17, 0.45, 0.70), painter.mesh(back, 800), "the other side")
-    _histogram(figure.add_axes((0.3, 0.075, 0.38, 0.07)), thickness.clip(low, high), atlas.areas)
+    _draw_histogram(
+        figure.add_axes((0.3, 0.075, 0.38, 0.07)), thickness.clip(low, high), atlas.areas
+    )
     save_plot(figure, path)
 
 
-def _histogram(axes: Axes, thickness: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
+def _draw_histogram(axes: Axes, thickness: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
     """Share of the surface over thickness, in the colours of the images, as their legend."""
     bins = np.linspace(thickness.min(), thickness.max(), _BARS + 1)
     share, _ = np.histogram(thickness, bins, weights=areas)

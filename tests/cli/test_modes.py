@@ -15,7 +15,7 @@ SHEET = "v 0 0 0\nv 0.5 0 0\nv 1 0 0\nv 0 0 1\nv 0.5 0 1\nv 1 0 1\nf 1 4 5 2\nf 
 
 def test_modes_of_a_sheet_with_a_fixed_rim_are_printed_and_drawn(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(atlas_painter, "OVERSAMPLING", 1)
-    monkeypatch.setattr(mode_plot, "_LARGEST", 64)
+    monkeypatch.setattr(mode_plot, "_MAX_PICTURE_SIZE", 64)
     mesh = tmp_path / "sheet.obj"
     plot = tmp_path / "modes.png"
     mesh.write_text(SHEET)
