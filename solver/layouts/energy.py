@@ -9,9 +9,9 @@ On the unit sphere J takes the triple product of the triangle's three unit vecto
 area: it vanishes exactly where the triangle folds over. Charts are the plane z = 1, where the
 triple product is twice the area. A finite energy thus means that nothing is folded.
 
-The star of a vertex: let the vertex move from p to p + dx x + dy y + dz p with tangents x, y. Of
-each triangle round it, J is linear in the move and D quadratic: a few numbers a triangle say all,
-and a trial position costs next to nothing.
+The star of a vertex are the triangles round it. Let the vertex move from p to p + dx x + dy y + dz
+p with tangents x, y. Then J of each triangle is linear in the move, and D quadratic. A few numbers
+a triangle hold both, and the energy at a trial position costs next to nothing.
 """
 
 from __future__ import annotations
@@ -26,12 +26,13 @@ from ..mesh.vectors import Vector, combine, cross, dot, row, subtract
 # A triangle is folded unless its triple product is greater than this.
 MIN_TRIPLE_PRODUCT = 1e-16
 
-# Longest step of a vertex: radians on the sphere, or charts.
+# Step of a vertex, at most: radians on the sphere, or charts.
 _MAX_STEP = 0.3
 
-# Trial steps of a line search, at most, and the factor from one to the next of a single vertex.
+# Trial steps of a line search, at most, and the length of a single vertex's trial step over the one
+# before.
 MAX_TRIALS = 14
-_SHORTER = 0.35
+_SHORTER_TRIAL = 0.35
 
 # Share of the fall that the slope promises, which a step must bring (Armijo's condition).
 _MIN_FALL_SHARE = 1e-4
@@ -52,8 +53,14 @@ _MIN_EIGENVALUE_SHARE = 1e-4
 # Keeps a division by a second derivative finite.
 _MIN_CURVATURE = 1e-300
 
-# Numbers of a triangle in the expansion of a star, see `expand_star`.
+# Directions in which a vertex may move: none, x, y, both.
+FIXED, COLUMN, ROW, FREE = range(4)
+
+# The numbers of a triangle in the expansion of a star, see `expand_star`: J and D at rest, their
+# slopes (the slope of J along p is J itself), half of D's second derivative, and the reference
+# area.
 TERMS = 9
+J, JX, JY, D, DX, DY, DZ, BEND, AREA = range(TERMS)
 
 
 class Density(NamedTuple):
@@ -174,14 +181,6 @@ def projected_hessian(
     )
 
 
-# Directions in which a vertex may move: none, x, y, both.
-FIXED, COLUMN, ROW, FREE = range(4)
-
-# The numbers of a triangle in the expansion of a star: J and D at rest, their slopes (that of J
-# along p is J itself), half of D's second derivative, and the reference area.
-J, JX, JY, D, DX, DY, DZ, BEND, AREA = range(TERMS)
-
-
 @kernel
 def expand_star(
     p: Vector,
@@ -200,10 +199,11 @@ def expand_star(
     second[i] over twice the area.
     """
     for i in range(degree):
-        e = subtract(row(first, i), p)
-        g = subtract(row(second, i), p)
-        a = (dot(e, x), dot(e, y), dot(e, p))
-        b = (dot(g, x), dot(g, y), dot(g, p))
+        to_first = subtract(row(first, i), p)
+        to_second = subtract(row(second, i), p)
+        # both sides in the frame x, y, p
+        a = (dot(to_first, x), dot(to_first, y), dot(to_first, p))
+        b = (dot(to_second, x), dot(to_second, y), dot(to_second, p))
         c = subtract(b, a)
         normal = cross(a, b)
         area = shapes[i, 0]
@@ -345,15 +345,15 @@ def descend(
         move = tangent_move(step * sx, step * sy, curvature)
         lower = star_energy(terms, degree, density, move)
         if lower < energy - _MIN_FALL_SHARE * step * descent:
-            further = 2.0 * lower < energy  # high up a wall a Newton step is far too short
-            while further:
+            fell_far = 2.0 * lower < energy  # high up a wall a Newton step is far too short
+            while fell_far:
                 step *= 2.0
-                ahead = tangent_move(step * sx, step * sy, curvature)
-                least = star_energy(terms, degree, density, ahead)
-                further = 2.0 * least < lower
-                if least < lower:
-                    move = ahead
-                    lower = least
+                longer_move = tangent_move(step * sx, step * sy, curvature)
+                longer_energy = star_energy(terms, degree, density, longer_move)
+                fell_far = 2.0 * longer_energy < lower
+                if longer_energy < lower:
+                    move = longer_move
+                    lower = longer_energy
             return energy - lower, move
-        step *= _SHORTER
+        step *= _SHORTER_TRIAL
     return 0.0, stay

@@ -21,9 +21,9 @@ from ..kernel import Floats, Ints32, kernel
 from ..mesh.vectors import Vector, combine, cross, dot, subtract
 from .energy import MAX_TRIALS, Reference, Shares, projected_hessian
 
-# Factors from one trial step to the next.
-_FURTHER = 1.6
-_SHORTER = 0.6
+# Length of a trial step over the one before.
+_LONGER_TRIAL = 1.6
+_SHORTER_TRIAL = 0.6
 
 # Residual at which conjugate gradients end, over the first one.
 CG_TOLERANCE = 0.03
@@ -89,7 +89,7 @@ def line_search(
     t = min(1.0, bound)
     lower = energy_at(t)
     fell_far = energy - lower > -0.5 * t * slope
-    factor = _FURTHER if fell_far else _SHORTER
+    factor = _LONGER_TRIAL if fell_far else _SHORTER_TRIAL
     for _ in range(MAX_TRIALS):
         if factor * t > bound:
             break
@@ -234,9 +234,9 @@ def _add_edge(
 
     `flat` and `twist` are the shares of the second derivatives of D and J along it.
     """
-    (e, forwards) = edge
-    (ux, uy, _, (px, py, qx, qy)) = u
-    (vx, vy, (dx, dy, jx, jy), _) = v
+    e, forwards = edge
+    ux, uy, _, (px, py, qx, qy) = u
+    vx, vy, (dx, dy, jx, jy), _ = v
     bent_x = combine(flat, ux, twist, cross(apex, ux))
     bent_y = combine(flat, uy, twist, cross(apex, uy))
     xy = dot(bent_x, vy) + px * dy + qx * jy

@@ -26,14 +26,15 @@ from ...mesh.vectors import Vector, cross, dot, row, subtract
 # Share of the remaining vertices that one round removes.
 _ROUND_SHARE = 0.15
 
-# Greatest degree of a merged vertex, which is raised where nothing else is left to collapse; and
-# the degree beyond which a collapse costs half as much again for each further neighbour.
+# Degree of a merged vertex, at most; the limit is raised where nothing else is left to collapse.
 _MAX_DEGREE = 12
+
+# Degree beyond which a collapse costs half as much again for each further neighbour.
 _COMFORTABLE_DEGREE = 8
 _COST_OF_A_DEGREE = 0.5
 
 # Squared lengths below this share of the mean squared edge count as equal.
-_BLUR = 1e-4
+_MIN_SQUARED_LENGTH = 1e-4
 
 # Vertices of a tetrahedron.
 _LAST_VERTICES = 4
@@ -131,11 +132,12 @@ def undo_collapse(table: CornerTable, h: int) -> None:
 
 @kernel
 def is_collapsible(table: CornerTable, u: int, v: int, mark: Ints32) -> bool:
-    """Tell whether v and u, beside whose neighbours `mark` [n] has u, meet the link condition."""
+    """Whether u and v meet the link condition; `mark` [n] has u at all neighbours of u."""
     first = h = table.leaving[v]
     common = 0
     while True:
-        common += mark[table.tail[following(h)]] == u
+        if mark[table.tail[following(h)]] == u:
+            common += 1
         h = table.twin[preceding(h)]
         if h == first:
             return common == 2
@@ -179,7 +181,7 @@ def decimate(table: CornerTable, V: Floats) -> Ints32:
     Returns the collapsed half-edges in order, [n - 4].
     """
     edges = V[table.tail] - V[table.tail[table.twin]]
-    blur = _BLUR * float(np.mean(np.sum(edges * edges, axis=1)))
+    blur = _MIN_SQUARED_LENGTH * float(np.mean(np.sum(edges * edges, axis=1)))
     n = len(V)
     log = np.empty(n - _LAST_VERTICES, np.int32)
     alive = np.arange(n, dtype=np.int32)
@@ -193,17 +195,17 @@ def decimate(table: CornerTable, V: Floats) -> Ints32:
         cost=np.full(n, np.inf),
         target=np.full(n, -1, np.int32),
     )
-    done = 0
+    collapses = 0
     max_degree = _MAX_DEGREE
-    while done < len(log):
+    while collapses < len(log):
         _price(alive, front, blur, max_degree)
         order = alive[np.argsort(front.cost[alive], kind="stable")]
-        quota = min(len(log) - done, max(1, int(_ROUND_SHARE * len(alive))))
-        removed = _collapse_round(order, quota, front, max_degree, log[done:])
+        quota = min(len(log) - collapses, max(1, int(_ROUND_SHARE * len(alive))))
+        removed = _collapse_round(order, quota, front, max_degree, log[collapses:])
         if removed == 0:
             max_degree *= 2
             front.stale[alive] = True
-        done += removed
+        collapses += removed
         alive = alive[front.cost[alive] >= 0.0]
     return log
 
@@ -236,7 +238,7 @@ def _price(alive: Ints32, front: _Front, blur: float, max_degree: int) -> None:
             v = table.tail[following(neighbours[i])]
             ring[i, 0], ring[i, 1], ring[i, 2] = row(V, v)
             mark[v] = u
-        least = np.inf
+        lowest_price = np.inf
         cheapest = -1
         for i in range(size):
             h = neighbours[i]
@@ -244,28 +246,28 @@ def _price(alive: Ints32, front: _Front, blur: float, max_degree: int) -> None:
             merged_degree = size + degree[v] - 4
             if merged_degree > max_degree:
                 continue
-            # the longest edge, and the one that vanishes, squared
             p = row(ring, i)
-            span = 0.0
+            longest_squared = 0.0
             for j in range(size):
-                e = subtract(row(ring, j), p)
-                span = max(span, dot(e, e))
-            e = subtract(position, p)
+                edge = subtract(row(ring, j), p)
+                longest_squared = max(longest_squared, dot(edge, edge))
+            vanishing_edge = subtract(position, p)
+            vanishing_squared = dot(vanishing_edge, vanishing_edge)
             crowding = 1.0 + _COST_OF_A_DEGREE * max(merged_degree - _COMFORTABLE_DEGREE, 0)
-            shape = (span + blur) * (dot(e, e) + blur) * crowding
+            shape = (longest_squared + blur) * (vanishing_squared + blur) * crowding
             error = max(_quadric_error(front.quadrics[u], p), 0.0)
             price = shape + error + blur * blur * front.merged[u]
-            if price < least and is_collapsible(table, u, v, mark):
-                least = price
+            if price < lowest_price and is_collapsible(table, u, v, mark):
+                lowest_price = price
                 cheapest = h
-        cost[u] = least
+        cost[u] = lowest_price
         front.target[u] = cheapest
 
 
 @kernel
 def _quadric_error(q: Floats, p: Vector) -> float:
     """Quadric [10] at a point; see `vertex_quadrics`."""
-    (x, y, z) = p
+    x, y, z = p
     square = (
         q[0] * x * x
         + q[3] * y * y
@@ -277,9 +279,10 @@ def _quadric_error(q: Floats, p: Vector) -> float:
 
 @kernel
 def _collapse_round(order: Ints32, quota: int, front: _Front, max_degree: int, log: Ints32) -> int:
-    """Collapse up to `quota` vertices in `order`, none of them beside another.
+    """Collapse up to `quota` vertices in `order`, none of them beside another; return how many.
 
-    A negative cost marks the vertices that are removed.
+    The collapsed half-edges are written into the log. A negative cost marks the vertices that are
+    removed.
     """
     table = front.table
     quadrics = front.quadrics
@@ -288,9 +291,9 @@ def _collapse_round(order: Ints32, quota: int, front: _Front, max_degree: int, l
     cost = front.cost
     star = np.empty(len(cost), np.int32)
     mark = np.full(len(cost), -1, np.int32)
-    done = 0
+    collapses = 0
     for u in order:
-        if done == quota or cost[u] == np.inf:
+        if collapses == quota or cost[u] == np.inf:
             break
         h = front.target[u]
         v = table.tail[following(h)]
@@ -313,6 +316,6 @@ def _collapse_round(order: Ints32, quota: int, front: _Front, max_degree: int, l
             quadrics[v, k] += quadrics[u, k]
         front.merged[v] += front.merged[u]
         cost[u] = -1.0
-        log[done] = h
-        done += 1
-    return done
+        log[collapses] = h
+        collapses += 1
+    return collapses

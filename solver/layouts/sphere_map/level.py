@@ -21,11 +21,11 @@ from ...mesh.vectors import Vector, cross, dot, row, subtract
 from ..energy import Reference
 from .decimation import CornerTable, following, gather_star, preceding
 
-# Least area of a reference triangle, over the mean one.
+# Area of a reference triangle, at least, over the mean area.
 _MIN_AREA_SHARE = 1e-3
 
-# Least area that a level may show of a vertex, over the area that the vertex carries; and the
-# greatest load.
+# Area that a level shows of a vertex, at least, over the area that the vertex carries; and the
+# load, at most.
 _MIN_SHOWN_SHARE = 1e-12
 _MAX_LOAD = 1e6
 
@@ -33,7 +33,7 @@ _MAX_LOAD = 1e6
 # equilateral.
 _MIN_SQUARED_SIDE = 1e-28
 
-# Least square of four times an area, which divides.
+# Square of four times an area, at least: the area divides.
 _MIN_SQUARED_AREA = 1e-300
 
 
@@ -63,7 +63,8 @@ def build_level(
     twin = corner_number[table.twin[corners]]
     lower = np.flatnonzero(np.arange(len(twin)) < twin)
     edge = np.empty(len(twin), dtype=np.int32)
-    edge[lower] = edge[twin[lower]] = np.arange(len(lower))
+    edge[lower] = np.arange(len(lower))
+    edge[twin[lower]] = edge[lower]
     ends = np.stack([tail[lower], tail[twin[lower]]], axis=1)
     star_start = np.concatenate([[0], np.cumsum(np.bincount(tail))]).astype(np.int32)
     star = np.empty(star_start[-1], dtype=np.int32)
@@ -92,9 +93,10 @@ def star_shapes(star: Ints32, reference: Reference) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def _renumber(kept: NDArray[np.integer], count: int) -> Ints32:
+def _renumber(chosen: NDArray[np.integer], count: int) -> Ints32:
+    """The place of each of `count` things among the chosen ones; -1 for the others."""
     number = np.full(count, -1, dtype=np.int32)
-    number[kept] = np.arange(len(kept))
+    number[chosen] = np.arange(len(chosen))
     return number
 
 
@@ -110,17 +112,18 @@ class RealSurface(NamedTuple):
     mean: float  # reference area of an average triangle
 
 
-def carry(removed: Ints32, kept: Ints32, carried: Floats) -> None:
+def carry(removed: Ints32, merged_with: Ints32, carried: Floats) -> None:
     """Hand the area of each removed vertex on to the vertex that it merges with.
 
-    They follow each other in the order of the collapses.
+    The vertices are in the order of the collapses.
     """
-    for u, v in zip(removed.tolist(), kept.tolist(), strict=True):
+    for u, v in zip(removed.tolist(), merged_with.tolist(), strict=True):
         carried[v] += carried[u]
 
 
 @kernel
 def _area(a: Vector, b: Vector, c: Vector) -> float:
+    """Area of the triangle a, b, c."""
     normal = cross(subtract(b, a), subtract(c, a))
     return 0.5 * np.sqrt(dot(normal, normal))
 
@@ -129,13 +132,13 @@ def _area(a: Vector, b: Vector, c: Vector) -> float:
 def update_load(v: int, star: Ints32, degree: int, tail: Ints32, surface: RealSurface) -> None:
     """Find the load of v: its carried area over its share of the real area that the level shows."""
     V = surface.V
-    shown = 0.0
+    star_area = 0.0
     for i in range(degree):
         h = 3 * (star[i] // 3)
-        shown += _area(row(V, tail[h]), row(V, tail[h + 1]), row(V, tail[h + 2]))
+        star_area += _area(row(V, tail[h]), row(V, tail[h + 1]), row(V, tail[h + 2]))
     carried = surface.carried[v]
-    own_share = max(shown / 3.0, _MIN_SHOWN_SHARE * carried)
-    surface.load[v] = min(carried / own_share, _MAX_LOAD)
+    shown = max(star_area / 3.0, _MIN_SHOWN_SHARE * carried)
+    surface.load[v] = min(carried / shown, _MAX_LOAD)
 
 
 @kernel

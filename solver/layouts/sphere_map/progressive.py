@@ -20,6 +20,7 @@ sticks (a long cigar), and remove rough errors; smooth errors are the work of `n
 from __future__ import annotations
 
 import functools
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,8 +104,20 @@ MAX_ROUNDS = 4
 # Way of a vertex in one Newton step, at most [rad].
 MAX_VERTEX_STEP = 0.7
 
-# Time up to which folds are searched for, in Newton steps.
+# Time up to which folds are searched for, in Newton steps; the steps in which the search proceeds,
+# and the halvings of the step that holds the fold.
 FOLD_HORIZON = 1.2
+FOLD_SEARCH_STEPS = 24
+FOLD_HALVINGS = 12
+
+# A triangle whose volume changes by less than this share up to the horizon is not searched.
+MAX_SAFE_CHANGE = 0.9
+
+# A Newton step goes no further than this share of the way to the first fold.
+MAX_SHARE_OF_FOLD = 0.9
+
+# Share of the Hessian's diagonal that is added to it, so that it is positive.
+HESSIAN_SHIFT = 1e-8
 
 # Corners of the tetrahedron with which the map begins: unit vectors.
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
@@ -135,6 +148,9 @@ TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)
 
 # Neighbours of a new vertex with more triangles than this are left to the sweeps.
 CROWDED_DEGREE = 64
+
+# Coefficients of a cubic polynomial, the constant first.
+Cubic: TypeAlias = tuple[float, float, float, float]
 
 
 def relax_level(level: Level, S: Floats, reference: Reference) -> None:
@@ -194,12 +210,12 @@ def tangent_frame(p: Vector) -> tuple[Vector, Vector]:
 def newton_step(
     level: Level, S: Floats, reference: Reference, cg_steps: int
 ) -> tuple[float, float]:
-    """Move the map S by one Newton step in place.
+    """Move the map S [n, 3] by one Newton step in place.
 
-    Up to `cg_steps` steps of conjugate gradients find its direction.
+    Returns the fall of the energy and the length of the step.
 
-    Returns by how much the energy fell, 0 where no step lowers it, and the step's length, 1 for a
-    whole Newton step.
+    Up to `cg_steps` steps of conjugate gradients find the direction. The step is 1 for a whole one,
+    and 0 where no step lowers the energy.
     """
     system = System.zeros(len(S), len(level.ends))
     x = np.empty_like(S)
@@ -211,16 +227,18 @@ def newton_step(
         return 0.0, 0.0
     velocity = step[:, :1] * x + step[:, 1:] * y
     longest = float(np.sqrt(np.max(np.sum(step * step, axis=1))))
-    bound = min(0.9 * _time_of_first_fold(level.tail, S, velocity), MAX_VERTEX_STEP / longest)
+    to_fold = MAX_SHARE_OF_FOLD * _time_of_first_fold(level.tail, S, velocity)
+    to_longest = MAX_VERTEX_STEP / longest
 
     def moved(t: float) -> Floats:
         ahead = S + t * velocity
         ahead *= (1.0 / np.sqrt(dot(ahead.T, ahead.T)))[:, None]
         return ahead
 
-    t, lower = line_search(
-        energy, slope, bound, lambda t: total_energy(level.tail, moved(t), reference)
-    )
+    def energy_at(t: float) -> float:
+        return total_energy(level.tail, moved(t), reference)
+
+    t, lower = line_search(energy, slope, min(to_fold, to_longest), energy_at)
     if t > 0.0:
         S[:] = moved(t)
     return energy - lower, t
@@ -230,9 +248,9 @@ def newton_step(
 def assemble(
     level: Level, S: Floats, reference: Reference, x: Floats, y: Floats, system: System
 ) -> float:
-    """Fill in the tangents x, y [n, 3] of the map S, add its triangles to the system.
+    """Add the triangles of the map S to the Newton system; return the energy of the map.
 
-    Returns the energy of the map.
+    The tangents x and y [n, 3] of the vertices are filled in.
     """
     for v in range(len(S)):
         (x[v, 0], x[v, 1], x[v, 2]), (y[v, 0], y[v, 1], y[v, 2]) = tangent_frame(row(S, v))
@@ -242,31 +260,31 @@ def assemble(
     ends = level.ends
     total = 0.0
     for f in range(len(tail) // 3):
-        u = tail[3 * f]
-        v = tail[3 * f + 1]
-        w = tail[3 * f + 2]
-        i = edge[3 * f]
-        j = edge[3 * f + 1]
-        k = edge[3 * f + 2]
-        energy, (at_u, at_v, at_w) = add_triangle(
+        a = tail[3 * f]
+        b = tail[3 * f + 1]
+        c = tail[3 * f + 2]
+        ab = edge[3 * f]
+        bc = edge[3 * f + 1]
+        ca = edge[3 * f + 2]
+        energy, (at_a, at_b, at_c) = add_triangle(
             f,
-            (u, v, w),
-            ((i, ends[i, 0] == u), (j, ends[j, 0] == v), (k, ends[k, 0] == w)),
-            (row(S, u), row(S, v), row(S, w)),
-            (row(x, u), row(x, v), row(x, w)),
-            (row(y, u), row(y, v), row(y, w)),
+            (a, b, c),
+            ((ab, ends[ab, 0] == a), (bc, ends[bc, 0] == b), (ca, ends[ca, 0] == c)),
+            (row(S, a), row(S, b), row(S, c)),
+            (row(x, a), row(x, b), row(x, c)),
+            (row(y, a), row(y, b), row(y, c)),
             reference,
             system,
         )
         total += energy
-        radial[u] += at_u
-        radial[v] += at_v
-        radial[w] += at_w
+        radial[a] += at_a
+        radial[b] += at_b
+        radial[c] += at_c
     diagonal = system.diagonal
     for v in range(len(S)):
         # on the sphere a tangent step also falls towards the centre: the Hessian gains minus the
         # radial slope
-        shift = max(-radial[v], 0.0) + 1e-8 * (diagonal[v, 0] + diagonal[v, 2])
+        shift = max(-radial[v], 0.0) + HESSIAN_SHIFT * (diagonal[v, 0] + diagonal[v, 2])
         diagonal[v, 0] += shift
         diagonal[v, 2] += shift
     return total
@@ -274,49 +292,61 @@ def assemble(
 
 @kernel
 def _time_of_first_fold(tail: Ints32, S: Floats, velocity: Floats) -> float:
-    """Lower bound on the first time at which a triangle folds, up to the horizon.
+    """Lower bound on the first time at which a triangle folds.
 
-    At that time t the determinant det(a + t a', b + t b', c + t c') is 0.
-
-    Infinite where no triangle folds by then.
+    The vertices move at constant velocities [n, 3]. The triangle a, b, c folds when the determinant
+    det(a + t a', b + t b', c + t c') is 0: a cubic polynomial of the time. Infinite where no
+    triangle folds up to the horizon.
     """
-    first = np.inf
+    first_time = np.inf
     for f in range(len(tail) // 3):
-        i = tail[3 * f]
-        j = tail[3 * f + 1]
-        k = tail[3 * f + 2]
-        p = row(S, i)
-        dp = row(velocity, i)
-        e = subtract(row(S, j), p)
-        g = subtract(row(S, k), p)
-        de = subtract(row(velocity, j), dp)
-        dg = subtract(row(velocity, k), dp)
-        n0 = cross(e, g)
-        n2 = cross(de, dg)
-        n1 = combine(1.0, cross(de, g), 1.0, cross(e, dg))
-        c0 = dot(p, n0)
-        c3 = dot(dp, n2)
-        c1 = dot(dp, n0) + dot(p, n1)
-        c2 = dot(dp, n1) + dot(p, n2)
-        if (
-            abs(c1) * FOLD_HORIZON + abs(c2) * FOLD_HORIZON**2 + abs(c3) * FOLD_HORIZON**3
-            < 0.9 * c0
-        ):
+        a = row(S, tail[3 * f])
+        a_rate = row(velocity, tail[3 * f])
+        ab = subtract(row(S, tail[3 * f + 1]), a)
+        ac = subtract(row(S, tail[3 * f + 2]), a)
+        ab_rate = subtract(row(velocity, tail[3 * f + 1]), a_rate)
+        ac_rate = subtract(row(velocity, tail[3 * f + 2]), a_rate)
+        # ab x ac as a quadratic polynomial of the time
+        normal_0 = cross(ab, ac)
+        normal_1 = combine(1.0, cross(ab_rate, ac), 1.0, cross(ab, ac_rate))
+        normal_2 = cross(ab_rate, ac_rate)
+        c0 = dot(a, normal_0)
+        c1 = dot(a_rate, normal_0) + dot(a, normal_1)
+        c2 = dot(a_rate, normal_1) + dot(a, normal_2)
+        c3 = dot(a_rate, normal_2)
+        max_change = abs(c1) * FOLD_HORIZON + abs(c2) * FOLD_HORIZON**2 + abs(c3) * FOLD_HORIZON**3
+        if max_change < MAX_SAFE_CHANGE * c0:
             continue
-        low = high = 0.0
-        for s in range(1, 25):
-            high = FOLD_HORIZON * s / 24
-            if c0 + high * (c1 + high * (c2 + high * c3)) <= 0.0:
-                for _ in range(12):
-                    middle = 0.5 * (low + high)
-                    if c0 + middle * (c1 + middle * (c2 + middle * c3)) > 0.0:
-                        low = middle
-                    else:
-                        high = middle
-                first = min(first, low)
-                break
-            low = high
-    return first
+        first_time = min(first_time, _first_root((c0, c1, c2, c3)))
+    return first_time
+
+
+@kernel
+def _first_root(cubic: Cubic) -> float:
+    """Lower bound on the first time at which a cubic polynomial is not positive any more.
+
+    Infinite where it is positive at all times that are tried, up to the horizon.
+    """
+    low = 0.0
+    for step in range(1, FOLD_SEARCH_STEPS + 1):
+        high = FOLD_HORIZON * step / FOLD_SEARCH_STEPS
+        if _value_at(cubic, high) <= 0.0:
+            for _ in range(FOLD_HALVINGS):
+                middle = 0.5 * (low + high)
+                if _value_at(cubic, middle) > 0.0:
+                    low = middle
+                else:
+                    high = middle
+            return low
+        low = high
+    return np.inf
+
+
+@kernel
+def _value_at(cubic: Cubic, t: float) -> float:
+    """Value of a cubic polynomial."""
+    c0, c1, c2, c3 = cubic
+    return c0 + t * (c1 + t * (c2 + t * c3))
 
 
 @kernel
@@ -433,8 +463,8 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     table = corner_table(F, n)
     log = decimate(table, V)
     removed = table.tail[log]
-    kept = table.tail[table.twin[log]]
-    carry(removed, kept, carried)
+    merged_with = table.tail[table.twin[log]]
+    carry(removed, merged_with, carried)
     # the number of vertices of the first level that shows each vertex or triangle
     vertex_since = np.full(n, 4)
     triangle_since = np.full(len(F), 4)
@@ -462,10 +492,9 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
         triangles = np.flatnonzero(triangle_since <= size)
         update_level(vertices, triangles, table, surface, reference)
         level_S = S[vertices]
-        shown = Reference(
-            reference.area[triangles], reference.cotangent.reshape(-1, 3)[triangles].ravel(), SPHERE
-        )
-        relax_level(build_level(table, vertices, triangles), level_S, shown)
+        level_cotangent = reference.cotangent.reshape(-1, 3)[triangles].ravel()
+        level_reference = Reference(reference.area[triangles], level_cotangent, SPHERE)
+        relax_level(build_level(table, vertices, triangles), level_S, level_reference)
         S[vertices] = level_S
     return S
 
@@ -492,7 +521,7 @@ def _gather(
     ring: Floats,
     shapes: Floats,
 ) -> None:
-    """Fill in what `relax_vertex` asks for, from the half-edges to the neighbours."""
+    """Fill in `ring` and `shapes` of `relax_vertex`, from the half-edges to the neighbours."""
     cotangent = reference.cotangent
     for i in range(degree):
         h = neighbours[i]
@@ -516,7 +545,12 @@ def _place(
     density: Density,
     terms: Floats,
 ) -> Vector:
-    """Where the energy of a new vertex's star is least among trial points on the ways from v."""
+    """The trial point at which the energy of a new vertex's star is least.
+
+    Trial points lie on two ways from v: to the middle of the star, and into the wedge between the
+    great circles through v and the neighbours left and right. The second way is tried if all points
+    of the first one fold a triangle. `ring`, `shapes` and `terms` are as in `relax_vertex`.
+    """
     start = row(S, v)
     x, y = tangent_frame(start)
     expand_star(start, x, y, ring, ring[1:], shapes, degree, terms)
@@ -524,8 +558,9 @@ def _place(
     for i in range(degree):
         middle = combine(1.0, middle, 1.0, row(ring, i))
     inward = combine(1.0, unit(cross(start, row(S, left))), 1.0, unit(cross(row(S, right), start)))
-    least = np.inf
+    lowest_energy = np.inf
     best = start
+    # the end of each way, the length of a trial over the one before, and the number of trials
     for goal, share, trials in (
         (unit(middle), 0.65, 16),
         (unit(combine(1.0, start, 1.0, unit(inward))), 0.4, 40),
@@ -537,13 +572,13 @@ def _place(
             energy = star_energy(
                 terms, degree, density, (dot(move, x), dot(move, y), dot(move, start))
             )
-            if energy < least:
-                least = energy
+            if energy < lowest_energy:
+                lowest_energy = energy
                 best = p
-            elif least < np.inf:
+            elif lowest_energy < np.inf:
                 break
             t *= share
-        if least < np.inf:
+        if lowest_energy < np.inf:
             break
     return best
 
