@@ -348,11 +348,11 @@ def distance_from_point(
     """
     grid = texels.grid
     scratch = distance_scratch(len(grid.positions))
-    seeds = seeded(grid.halo, grid.positions, center, point, scratch.distance, scratch.touched)
-    touched, known = march(grid.halo, grid.positions, seeds, limit, scratch)
-    reached = np.sort(scratch.order[:known])
+    seeds = seeded(grid.halo, grid.positions, center, point, scratch.distance, scratch.reached)
+    reached_count, final_count = march(grid.halo, grid.positions, seeds, limit, scratch)
+    reached = np.sort(scratch.order[:final_count])
     distance = scratch.distance[reached]
-    clean(scratch, touched)
+    clean(scratch, reached_count)
     return reached, distance
 
 

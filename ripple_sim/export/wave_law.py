@@ -16,7 +16,7 @@ from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 from ripple_sim.solver.texels.stencil import Stencil, rim_ties, stiffness_matrix
 from ripple_sim.solver.texels.thickness import medial_radius
-from ripple_sim.solver.waves.height_map import FREE, MOST, halo_sources
+from ripple_sim.solver.waves.height_map import FREE_SHARE, MAX_SHARE, halo_sources
 
 from .page_coding import ScaledField, differences, packed, planes, scaled_field
 
@@ -92,8 +92,8 @@ def wave_law(
             "viscous": viscous,
             "spring": max(float(np.median(movable)), 0.0),
         },
-        "free": FREE,
-        "most": MOST,
+        "free": FREE_SHARE,
+        "most": MAX_SHARE,
         "pulse": pulse,
     }
     _add_links(content, operator)

@@ -113,12 +113,12 @@ class Team:
     """
 
     def __init__(self, texels: int, threads: int | None) -> None:
-        self._asked = threads is not None
+        self._is_fixed = threads is not None
         self._pace = Pace(thread_count(texels, threads))
 
     def run(self, task: Callable[[Crew], object], substeps: int) -> None:
         """Run a task of some substeps in each of the threads."""
-        if self._asked:
+        if self._is_fixed:
             run_together(task, self._pace.threads)
             return
         threads = self._pace.choose()

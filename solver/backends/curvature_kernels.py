@@ -109,6 +109,6 @@ def _pull_neighbours(
             pull = to_uu[c] * uu[c] + to_vv[c] * vv[c] + to_uv[c] * uv[c]
             pulled[c] -= pull
             own[c] += pull
-    here = force[at : at + count]
+    pulled = force[at : at + count]
     for c in range(count):
-        here[c] += own[c]
+        pulled[c] += own[c]

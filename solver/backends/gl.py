@@ -18,7 +18,7 @@ from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator
 from ..texels import cells
 from ..texels.moving import MovedStencil, interpolate
-from ..texels.quad_pass import LEAST_RATIO
+from ..texels.quad_pass import MIN_AREA_RATIO
 from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from ..texels.topology import TexelTopology
 from .backend import NO_LOAD, TexelLoad
@@ -36,7 +36,15 @@ from .step_kernels import Amplitude
 from .surface_fields import SurfaceFields
 
 # Constants of `cells` that the shader of a quad's stiffness needs
-_QUAD_CONSTANTS = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "FADED", "TINY", "PER_TINY")
+_QUAD_CONSTANTS = (
+    "PER_HOURGLASS",
+    "MAX_HOURGLASS_SHARE",
+    "EVENNESS",
+    "MIN_AREA",
+    "DETOUR_FADE",
+    "TINY",
+    "PER_TINY",
+)
 
 
 class DeviceStiffness:
@@ -87,7 +95,7 @@ class DeviceStiffness:
         names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
         self._shaders = {name: fields.shader(name) for name in names}
         law = {name: float(getattr(cells, name)) for name in _QUAD_CONSTANTS}
-        self._shaders["quads"] = fields.shader("quads", **law, LEAST_RATIO=float(LEAST_RATIO))
+        self._shaders["quads"] = fields.shader("quads", **law, MIN_AREA_RATIO=float(MIN_AREA_RATIO))
 
     def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks:
         """Write the nine-point stencil into a buffer of `FieldLayout.links`.

@@ -22,12 +22,12 @@ class Probes(NamedTuple):
     @classmethod
     def together(cls, probes: Sequence[Probes]) -> Probes:
         """The sums of several probes, one after the other."""
-        counts = np.concatenate([np.diff(each.begins) for each in probes])
+        counts = np.concatenate([np.diff(group.begins) for group in probes])
         return cls(
             begins=np.append(0, np.cumsum(counts)),
-            texels=np.concatenate([each.texels for each in probes]),
-            weights=np.concatenate([each.weights for each in probes]),
-            heights=np.concatenate([each.heights for each in probes]),
+            texels=np.concatenate([group.texels for group in probes]),
+            weights=np.concatenate([group.weights for group in probes]),
+            heights=np.concatenate([group.heights for group in probes]),
         )
 
     def of(self, height: NDArray, velocity: NDArray) -> NDArray[np.float64]:

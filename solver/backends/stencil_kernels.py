@@ -96,10 +96,10 @@ def force_at(
 @kernel(no_cpython_wrapper=True)
 def irregular_force(links: Links, i: int, h: Floats32) -> np.float32:
     """Sum of weight (h_j - h_i) over the irregular links of texel i of the list."""
-    here = h[links.addresses[i]]
+    height = h[links.addresses[i]]
     force = np.float32(0)
     for k in range(links.begins[i], links.begins[i + 1]):
-        force += links.weights[k] * (h[links.others[k]] - here)
+        force += links.weights[k] * (h[links.others[k]] - height)
     return force
 
 

@@ -134,15 +134,13 @@ def kick_drift(
         extra = row_of(kick.extra, at, pitch)
         acceleration = row_of(kick.acceleration, first, columns)
         for c in range(1, columns + 1):
-            held = (
-                value_in(span, c - 1) * value_in(acceleration, c - 1)
-                - value_in(spring, c - 1) * row[c]
-            )
+            pressed = value_in(span, c - 1) * value_in(acceleration, c - 1)
+            small = pressed - value_in(spring, c - 1) * row[c]
             force = force_at(
                 below, row, above, east, north, south, rising, risen, falling, fallen, c
             )
             new = value_in(decay, c - 1) * velocity[c] + (
-                gain[c - 1] * (force + value_in(extra, c)) + held
+                gain[c - 1] * (force + value_in(extra, c)) + small
             )
             velocity[c] = new
             result[c] = row[c] + dt * new

@@ -20,22 +20,23 @@ from .material import SHORTEST_TEXELS, Material, warn_of_wavelengths
 from .plate_rim import Rim
 from .wave_operator import WaveOperator
 
-# Residual of a mode, over its squared frequency. Squared frequencies that differ by a smaller share
-# count as one.
-_RESIDUAL = 1e-9
+# Residual of a mode, over its squared frequency, at most. Squared frequencies that differ by a
+# smaller share count as one.
+_MAX_RESIDUAL = 1e-9
 
 # Squared frequencies below this share of the mean squared frequency of all texels are round-off.
-_ROUND_OFF = 1e-13
+_MIN_SQUARE_SHARE = 1e-13
 
 # Share of the damping that is added to the stiffness, over the mean of both, so that modes of one
 # frequency are those that the damping does not mix.
 _DAMPING_SHARE = 1e-6
 
-# A mode counts as linear in the place if a linear function misses less than this share of it.
-_LINEAR = 0.1
+# A mode counts as linear in the place if its misfit to a linear function is less than this share.
+_MAX_LINEAR_MISFIT = 0.1
 
-# Pull on a mode, over that of bending on a wave of its length, below which nothing pulls it back.
-_NO_PULL = 0.01
+# Pull on a mode, over the pull of bending on a wave of its length, below which nothing pulls the
+# mode back.
+_MIN_PULL_SHARE = 0.01
 
 
 class Modes(NamedTuple):
@@ -90,13 +91,13 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
     # not from the operator's stiffness, which links outweigh beside the rims of a plate
     matrix = elastic_matrix(operator)
     weight = operator.mass.ravel()
-    least = float(np.min(material.stiffness))
+    least_square = float(np.min(material.stiffness))  # squared frequency [1/s^2]
     elastic = matrix
     moving = np.flatnonzero(operator.free.ravel() & (matrix.diagonal() > 0))
-    most = int(np.pi * len(moving) / SHORTEST_TEXELS**2)  # by Weyl's law
-    if not (isinstance(count, numbers.Integral) and 1 <= count <= most):
+    max_count = int(np.pi * len(moving) / SHORTEST_TEXELS**2)  # by Weyl's law
+    if not (isinstance(count, numbers.Integral) and 1 <= count <= max_count):
         raise SolverError(
-            f"count of modes must be a whole number from 1 to {most}, got {shown(count)}: of "
+            f"count of modes must be a whole number from 1 to {max_count}, got {shown(count)}: of "
             f"{len(moving):,} texels that move, further modes have waves of fewer than "
             f"{SHORTEST_TEXELS:g}; take a finer atlas for more"
         )
@@ -110,9 +111,9 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
             )
         matrix = stiffness_matrix(operator.geometry)
         weight = operator.areas.ravel()
-        least = 0.0
+        least_square = 0.0
     tilts = 0 if operator.bending is None else 2  # of a flat plate, at most
-    vectors = _lowest(matrix[moving][:, moving], weight[moving], least, int(count) + tilts)
+    vectors = _lowest(matrix[moving][:, moving], weight[moving], least_square, int(count) + tilts)
     heights = np.zeros((vectors.shape[1], operator.mass.size))
     heights[:, moving] = vectors.T
     if tilts:
@@ -147,11 +148,13 @@ def _are_tilts(
     areas = atlas.areas.ravel()
     linear = np.column_stack([np.ones(areas.size), atlas.positions.reshape(-1, 3)])
     misfit = heights.T - linear @ np.linalg.lstsq(linear, heights.T)[0]
-    is_linear = np.linalg.norm(misfit, axis=0) < _LINEAR * np.linalg.norm(heights, axis=1)
+    is_linear = np.linalg.norm(misfit, axis=0) < _MAX_LINEAR_MISFIT * np.linalg.norm(
+        heights, axis=1
+    )
     squared_frequencies = _quotients(heights, elastic, mass)
     squared_wave_numbers = _quotients(heights, atlas.stiffness(), areas)
     bending = material.texels("bending", atlas.areas.shape).mean()
-    return is_linear & (squared_frequencies < _NO_PULL * bending * squared_wave_numbers**2)
+    return is_linear & (squared_frequencies < _MIN_PULL_SHARE * bending * squared_wave_numbers**2)
 
 
 def _quotients(heights: Floats, matrix: csr_array, weight: Floats) -> Floats:
@@ -160,13 +163,13 @@ def _quotients(heights: Floats, matrix: csr_array, weight: Floats) -> Floats:
     return energies / (heights**2 @ weight)
 
 
-def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Floats:
+def _lowest(stiffness: csr_array, mass: Floats, least_square: float, count: int) -> Floats:
     """Vectors [k, count] of the lowest modes that are not rigid.
 
-    No squared frequency is below `least` [1/s^2]. Shift-invert Lanczos (Ericsson and Ruhe 1980)
-    finds, except for round-off, one vector of each frequency. So it runs again in the complement of
-    all vectors that are found, until nothing lower remains there: no mode of several with one
-    frequency is missed.
+    No squared frequency is below `least_square` [1/s^2]. Shift-invert Lanczos (Ericsson and Ruhe
+    1980) finds, except for round-off, one vector of each frequency. So it runs again in the
+    complement of all vectors that are found, until nothing lower remains there: no mode of several
+    with one frequency is missed.
     """
     size = len(mass)
     # in units of the roots of the masses the modes are eigenvectors of one symmetric matrix
@@ -175,12 +178,13 @@ def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Flo
     mean = float(matrix.diagonal().mean())
     # below the lowest mode, whose square is about mean / size for a membrane, mean / size^2 for a
     # plate
-    shift = least - max((mean - least) / size**2, _RESIDUAL * mean)
+    margin = max((mean - least_square) / size**2, _MAX_RESIDUAL * mean)
+    shift = least_square - margin
     solve = factorised(matrix - shift * diags_array(np.ones(size)))
     generator = np.random.default_rng(0)
     basis = np.empty((size, 0))
     squares = np.empty(0)
-    wanted = count + 2
+    vectors_to_find = count + 2
 
     def inverse(x: Floats) -> Floats:
         y = solve(x)
@@ -190,20 +194,25 @@ def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Flo
     while True:
         start = generator.standard_normal(size)
         values, new = eigsh(
-            matrix, min(wanted, size - 1), sigma=shift, OPinv=lanczos, v0=start, tol=_RESIDUAL
+            matrix,
+            min(vectors_to_find, size - 1),
+            sigma=shift,
+            OPinv=lanczos,
+            v0=start,
+            tol=_MAX_RESIDUAL,
         )
-        rigid = int((squares < _ROUND_OFF * mean).sum())
+        rigid = int((squares < _MIN_SQUARE_SHARE * mean).sum())
         has_enough = len(squares) >= rigid + count
-        if has_enough and values.min() >= (1 - _RESIDUAL) * squares[rigid + count - 1]:
+        if has_enough and values.min() >= (1 - _MAX_RESIDUAL) * squares[rigid + count - 1]:
             return inverse_roots @ basis[:, rigid : rigid + count]
         joined = qr(np.column_stack([basis, new]), mode="economic")[0]
         squares, mixed = eigh(joined.T @ (matrix @ joined))
         basis = joined @ mixed
-        wanted = 2 + count // 4
+        vectors_to_find = 2 + count // 4
 
 
 def _ringing(operator: WaveOperator, elastic: csr_array, heights: Floats) -> Modes:
-    """Modes of heights [count, T] that swing by themselves; see `elastic_matrix`."""
+    """Modes in the space of some heights [count, T]; for `elastic` see `elastic_matrix`."""
     shape = (len(heights), *operator.mass.shape)
     momenta = np.empty(shape)
     drag = np.empty(shape)

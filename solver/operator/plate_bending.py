@@ -1,6 +1,4 @@
-"""The bending of a plate with rims, as a sum of squares.
-
-Its energy is never negative, whatever its shape and rims.
+"""The bending of a plate with rims, as a sum of squares: its energy is never negative.
 
 A plate's energy is D / 2 times the integral of (1 - nu) |H|^2 + nu (tr H)^2, with the rigidity D,
 Poisson's ratio nu and the second derivatives H of its height in the surface. Where neither the
@@ -56,28 +54,29 @@ _SUPPORT_WEIGHT = 30.0
 # Spacings of texels up to which supports count in a fit.
 _SUPPORT_REACH = 1.5
 
-# Least length of a way in the tangent plane, in spacings, that is stretched to its length in space.
-_LEAST_WAY = 1e-9
+# Length of a way in the tangent plane, in spacings, at least, that is stretched to its length in
+# space.
+_MIN_WAY = 1e-9
 
-# Springs below this share of the diagonal of their row are round-off.
-_SPRING_ROUND_OFF = 1e-9
+# Springs up to this share of the diagonal of their row are round-off.
+_MIN_SPRING_SHARE = 1e-9
 
 # Fits that are solved at once, so that their arrays stay small.
-_BLOCK = 2**14
+_FITS_IN_BLOCK = 2**14
 
-# Share of the surface that sets the rate that softening leaves alone: only texels faster than
-# nearly all others are softened.
-_BULK = 0.95
+# Share of the surface that is its bulk. The bulk sets the rate that softening leaves alone: only
+# texels faster than nearly all others are softened.
+_BULK_SHARE = 0.95
 
 # Rate to which texels are softened, in units of Gershgorin's bound for the bulk of the surface.
-_FASTER = 1.2
+_TOLERATED_RATE = 1.2
 
 # Share of its curvatures that a texel may lose, to ridges or for the sake of the time step, before
 # its bending is not to be trusted.
-_LOSS = 0.25
+_MAX_TRUSTED_LOSS = 0.25
 
 # Share of the surface that such texels may have before the solver warns.
-_UNTRUSTED = 0.05
+_MAX_UNTRUSTED_SHARE = 0.05
 
 
 class Fits(NamedTuple):
@@ -139,10 +138,10 @@ class Rows(NamedTuple):
     owners: Ints
 
     @classmethod
-    def together(cls, *parts: Rows) -> Rows:
-        """The rows of all parts, one below the other."""
-        matrix = csr_array(vstack([part.matrix for part in parts]))
-        return cls(matrix, np.concatenate([part.owners for part in parts]))
+    def together(cls, *groups: Rows) -> Rows:
+        """The rows of all groups, one below the other."""
+        matrix = csr_array(vstack([rows.matrix for rows in groups]))
+        return cls(matrix, np.concatenate([rows.owners for rows in groups]))
 
     def scaled(self, factors: Floats) -> csr_array:
         """The matrix with each texel's rows multiplied by its factor, [T]."""
@@ -191,23 +190,24 @@ def plate_bending(
     stiff = rigidities * areas
     laplacian = -stiffness_matrix(laplace)
     near = shared_cells(texels)
-    held = np.bincount(places.texels[places.conditions == CLAMPED], minlength=count) > 0
+    beside_clamp = np.bincount(places.texels[places.conditions == CLAMPED], minlength=count) > 0
     outer = _outer_texels(places, softening.reshape(-1) < 1, near)
-    regular = regular_texels(topology).reshape(-1) & ~outer & ~held
-    irregular = ~(regular | outer | held)
+    regular = regular_texels(topology).reshape(-1) & ~outer & ~beside_clamp
+    irregular = ~(regular | outer | beside_clamp)
 
-    weights, kept = _regular_weights(texels, regular, stiff, poisson)
+    # how much of the curvature of each texel ridges leave, [T]
+    weights, left_share = _regular_weights(texels, regular, stiff, poisson)
     inside = Rows(Curvatures(topology, weights, rigidity).matrix, np.tile(np.arange(count), KINDS))
     neighbourhood_fits = _neighbourhood_fits(texels, np.flatnonzero(irregular), near)
     rim_fits = _rim_fits(texels, np.flatnonzero(outer), near, places)
-    rings, kept[irregular] = _bending_rows(neighbourhood_fits, stiff, poisson, _RIDGE_INSIDE)
-    rims, kept[outer] = _bending_rows(rim_fits, stiff, poisson, _RIDGE_OUTSIDE)
+    rings, left_share[irregular] = _bending_rows(neighbourhood_fits, stiff, poisson, _RIDGE_INSIDE)
+    rims, left_share[outer] = _bending_rows(rim_fits, stiff, poisson, _RIDGE_OUTSIDE)
     missed = _misfit_rows(rim_fits, rigidities)
     clamps = _clamp_rows(texels, places, rigidities, laplacian)
     beside = Rows.together(rings, rims, missed, clamps)
 
     factors = _evened(Rows.together(inside, beside), laplacian, stiff, areas)
-    _warn_of_softened(kept * factors, areas)
+    _warn_of_softened(left_share * factors, areas)
     roots = np.sqrt(factors)
     matrix = beside.scaled(roots)
     curvatures = Curvatures(topology, weights * roots.reshape(topology.shape), rigidity)
@@ -227,8 +227,8 @@ def shared_cells(texels: TexelMesh) -> csr_array:
     triangles = quads[:, [0, 0, -1, -1], [0, -1, -1, 0]][chart, corner]
     kinds = [quads[(quads >= 0).all(axis=-1)], triangles[triangles >= 0].reshape(-1, 3)]
     for size in sorted({len(polygon) for polygon in topology.polygons}):
-        alike = [polygon for polygon in topology.polygons if len(polygon) == size]
-        kinds.append(np.array(alike))
+        of_this_size = [polygon for polygon in topology.polygons if len(polygon) == size]
+        kinds.append(np.array(of_this_size))
     shared = csr_array((count, count))
     for corners in filter(len, kinds):
         # a cell across a glued side comes once from each chart
@@ -267,10 +267,10 @@ def _regular_weights(
     around_weights = np.where(is_beside, _WEIGHT_BESIDE, _WEIGHT_ACROSS)
     importance = np.append(around_weights, 1.0)  # last the texel itself
     weights = np.zeros((KINDS, len(STEPS), count))
-    kept = np.ones(count)
-    at = np.flatnonzero(regular)
-    for begin in range(0, len(at), _BLOCK):
-        block = at[begin : begin + _BLOCK]
+    left_share = np.ones(count)
+    fitted = np.flatnonzero(regular)
+    for begin in range(0, len(fitted), _FITS_IN_BLOCK):
+        block = fitted[begin : begin + _FITS_IN_BLOCK]
         columns = np.column_stack([around[:, block].T, block])
         areas = texels.areas.reshape(-1)[columns]
         spacings = np.sqrt(areas.mean(axis=1))
@@ -279,9 +279,9 @@ def _regular_weights(
         flat = _in_tangent_plane(texels.normals.reshape(-1, 3)[block][:, None], ways)
         fit_weights = np.sqrt(areas) / spacings[:, None] * importance
         fits = Fits(block, columns, fit_weights, flat, spacings)
-        curved, kept[block] = _curvature_weights(fits, stiff, poisson, _RIDGE_INSIDE)
+        curved, left_share[block] = _curvature_weights(fits, stiff, poisson, _RIDGE_INSIDE)
         weights[:, :, block] = np.moveaxis(curved[:, :, :-1], 0, -1)
-    return weights.reshape(KINDS, len(STEPS), *texels.shape), kept
+    return weights.reshape(KINDS, len(STEPS), *texels.shape), left_share
 
 
 def _neighbourhood_fits(texels: TexelMesh, at: Ints, near: csr_array) -> Fits:
@@ -312,10 +312,9 @@ def _rim_fits(texels: TexelMesh, at: Ints, near: csr_array, places: RimPlaces) -
     weights = np.sqrt(areas[column]) / spacings[owner] * np.exp(-(distance**2) / 2)
     texels_around = FitPlaces(owner, column, points[column], weights)
 
-    held = np.flatnonzero(places.conditions != FREE)
-    beside = csr_array(
-        (np.ones(len(held)), (places.texels[held], held)), shape=(count, len(places.points))
-    )
+    supported = np.flatnonzero(places.conditions != FREE)
+    entries = places.texels[supported], supported
+    beside = csr_array((np.ones(len(supported)), entries), shape=(count, len(places.points)))
     owner, place = (rings @ beside).nonzero()
     distance = np.linalg.norm(places.points[place] - points[at[owner]], axis=1) / spacings[owner]
     weights = np.where(distance <= _SUPPORT_REACH, _SUPPORT_WEIGHT, 0.0)
@@ -355,7 +354,7 @@ def _in_tangent_plane(normals: Floats, ways: Floats) -> Floats:
     first = across / np.linalg.norm(across, axis=-1, keepdims=True)
     second = np.cross(normals, first)
     flat = np.stack([(ways * first).sum(axis=-1), (ways * second).sum(axis=-1)], axis=-1)
-    shortened = np.maximum(np.linalg.norm(flat, axis=-1), _LEAST_WAY)
+    shortened = np.maximum(np.linalg.norm(flat, axis=-1), _MIN_WAY)
     stretch = np.linalg.norm(ways, axis=-1) / shortened
     return flat * stretch[..., None]
 
@@ -385,7 +384,7 @@ def _curvature_weights(
     """
     weighed, inverse = _solved(fits, ridge)
     second = inverse[:, 3:]
-    kept: Floats = np.einsum("okw,owk->ok", second, weighed[:, :, 3:]).min(axis=1)
+    left_shares: Floats = np.einsum("okw,owk->ok", second, weighed[:, :, 3:])
     uu, uv, vv = np.moveaxis(second * fits.weights[:, None], 1, 0)
     mean = np.sqrt((1 + poisson) / 2)
     difference = np.sqrt((1 - poisson) / 2)
@@ -393,14 +392,14 @@ def _curvature_weights(
     curved: Floats = np.stack(
         [mean * (uu + vv), difference * (uu - vv), 2 * difference * uv], axis=1
     )
-    return curved * scale[:, None, None], kept
+    return curved * scale[:, None, None], left_shares.min(axis=1)
 
 
 def _bending_rows(fits: Fits, stiff: Floats, poisson: float, ridge: float) -> tuple[Rows, Floats]:
     """The curvatures of fits as rows, and the share of each that ridges leave, [o]."""
-    curved, kept = _curvature_weights(fits, stiff, poisson, ridge)
+    curved, left_share = _curvature_weights(fits, stiff, poisson, ridge)
     matrix = _row_matrix(curved, fits.columns, len(stiff))
-    return Rows(matrix, np.repeat(fits.texels, KINDS)), kept
+    return Rows(matrix, np.repeat(fits.texels, KINDS)), left_share
 
 
 def _misfit_rows(fits: Fits, rigidity: Floats) -> Rows:
@@ -431,15 +430,16 @@ def _clamp_rows(
     """
     areas = texels.areas.reshape(-1)
     clamped = places.conditions == CLAMPED
-    held = places.texels[clamped]
-    away = np.linalg.norm(places.points[clamped] - texels.positions.reshape(-1, 3)[held], axis=1)
-    share = np.minimum(away**2 / (2 * areas[held]), 0.5)
-    heights = eye_array(len(areas), format="csr")[held]
-    spring_roots = diags_array(np.sqrt(_MISFIT_STIFFNESS * rigidity / areas)[held])
-    leaving = spring_roots @ (heights - diags_array(share) @ laplacian[held])
-    once = np.unique(held)  # a texel in a corner lies beside two places
+    beside = places.texels[clamped]
+    ways = places.points[clamped] - texels.positions.reshape(-1, 3)[beside]
+    away = np.linalg.norm(ways, axis=1)
+    share = np.minimum(away**2 / (2 * areas[beside]), 0.5)
+    heights = eye_array(len(areas), format="csr")[beside]
+    spring_roots = diags_array(np.sqrt(_MISFIT_STIFFNESS * rigidity / areas)[beside])
+    leaving = spring_roots @ (heights - diags_array(share) @ laplacian[beside])
+    once = np.unique(beside)  # a texel in a corner lies beside two places
     bent = diags_array(np.sqrt(rigidity / areas)[once]) @ laplacian[once]
-    return Rows(csr_array(vstack([leaving, bent])), np.concatenate([held, once]))
+    return Rows(csr_array(vstack([leaving, bent])), np.concatenate([beside, once]))
 
 
 def _evened(rows: Rows, laplacian: csr_array, stiff: Floats, areas: Floats) -> Floats:
@@ -455,8 +455,8 @@ def _evened(rows: Rows, laplacian: csr_array, stiff: Floats, areas: Floats) -> F
     rate = pull.T @ (pull @ ones) / areas
     order = np.argsort(rate)
     covered = np.cumsum(areas[order])
-    bulk = rate[order[np.searchsorted(covered, _BULK * covered[-1])]]
-    bound = _FASTER * max(closed, bulk)
+    bulk = rate[order[np.searchsorted(covered, _BULK_SHARE * covered[-1])]]
+    bound = _TOLERATED_RATE * max(closed, bulk)
     slowing = bound / np.maximum(rate, bound)
     entry = pull.tocoo()
     owner = rows.owners[entry.row]
@@ -466,10 +466,10 @@ def _evened(rows: Rows, laplacian: csr_array, stiff: Floats, areas: Floats) -> F
     return factors
 
 
-def _warn_of_softened(kept: Floats, areas: Floats) -> None:
-    """Warn where more than a small part of the surface keeps less of its bending than it should."""
-    share = areas[kept < 1 - _LOSS].sum() / areas.sum()
-    if share > _UNTRUSTED:
+def _warn_of_softened(left_share: Floats, areas: Floats) -> None:
+    """Warn if too many texels have less than their bending: `left_share` [T] of it is left."""
+    share = areas[left_share < 1 - _MAX_TRUSTED_LOSS].sum() / areas.sum()
+    if share > _MAX_UNTRUSTED_SHARE:
         warn_caller(
             f"the plate is softer than its material on {100 * share:.0f} % of its surface, where "
             "texels are too narrow to tell its curvature; frequencies may be too low: take a mesh "
@@ -482,6 +482,6 @@ def _links_and_springs(matrix: csr_array) -> tuple[IrregularLinks, Floats]:
     above = triu(matrix, 1).tocoo()
     springs = matrix @ np.ones(matrix.shape[0])
     diagonal = matrix.diagonal()
-    springs[np.abs(springs) <= _SPRING_ROUND_OFF * diagonal] = 0.0
+    springs[np.abs(springs) <= _MIN_SPRING_SHARE * diagonal] = 0.0
     ends = np.stack([above.row, above.col], axis=1).astype(np.int64)
     return IrregularLinks.of(ends, -above.data), springs

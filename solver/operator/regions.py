@@ -14,11 +14,11 @@ from ..texels.smoothing import smoothed
 from .material import Material
 
 # Held share of a texel's neighbourhood from which on the texel is held wholly. At the outline of a
-# region it is a half.
-_WHOLLY_HELD = 0.8
+# region the share is a half.
+_WHOLLY_HELD_SHARE = 0.8
 
 # Held share of a texel from which on it is clamped.
-_CLAMPED = 0.98
+_CLAMPED_SHARE = 0.98
 
 
 def absorbing_damping(
@@ -30,11 +30,10 @@ def absorbing_damping(
 ) -> NDArray[np.float64]:
     """Damping in a region that absorbs waves: it grows with the square of the depth in the region.
 
-    It grows so gently that little is reflected.
-
-    A wave that goes through a layer of width w and back loses the factor exp(-integral of zeta /
-    c), which for zeta = z (depth / w)^2 is exp(-z w / 3 c). Waves longer than the layer is wide are
-    partly reflected whatever the damping (Israeli and Orszag 1981).
+    It grows so gently that little is reflected. A wave that goes through a layer of width w and
+    back loses the factor exp(-integral of zeta / c), which for zeta = z (depth / w)^2 is exp(-z w /
+    3 c). Waves longer than the layer is wide are partly reflected whatever the damping (Israeli and
+    Orszag 1981).
 
     Parameters
     ----------
@@ -86,12 +85,11 @@ def absorbing_damping(
 def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
     """Material that holds a region still: waves reflect from it inverted, as from a clamp.
 
-    Pushes do not move the region.
-
-    A clamp, like a region of speed 0, ends at texels: its rim is a staircase, and the surface is
-    torn or kinked along it. Here springs lead up to the clamp, over a few texels about the rim. The
-    springs stiffen with the held share of the neighbourhood, so that the height fades out along the
-    region's true outline. They take no energy. Waves turn at the outline, within a texel.
+    Pushes do not move the region. A clamp, like a region of speed 0, ends at texels: its rim is a
+    staircase, and the surface is torn or kinked along it. Here springs lead up to the clamp, over a
+    few texels about the rim. The springs stiffen with the held share of the neighbourhood, so that
+    the height fades out along the region's true outline. They take no energy. Waves turn at the
+    outline, within a texel.
 
     Parameters
     ----------
@@ -118,7 +116,7 @@ def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
         raise SolverError(
             "shares of the held region must be numbers from 0 to 1, got one below 0, above 1 or NaN"
         )
-    share = np.clip(smoothed(atlas.texels.topology, share) / _WHOLLY_HELD, 0, 1)
+    share = np.clip(smoothed(atlas.texels.topology, share) / _WHOLLY_HELD_SHARE, 0, 1)
     shape = atlas.areas.shape
     speed = material.texels("speed", shape)
     bending = material.texels("bending", shape)
@@ -127,5 +125,5 @@ def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
     # as stiff as the pull of a texel's neighbours: a wave falls to 1/e within a texel
     springs = share**2 * (speed**2 / atlas.areas + bending / atlas.areas**2)
     return dataclasses.replace(
-        material, stiffness=stiffness + springs, fixed=fixed | (share >= _CLAMPED)
+        material, stiffness=stiffness + springs, fixed=fixed | (share >= _CLAMPED_SHARE)
     )

@@ -11,9 +11,9 @@ from .deep_water import factorised
 from .modes import elastic_matrix
 from .wave_operator import WaveOperator
 
-# Pull of a surface on a constant height, over the mean pull on single texels, below which nothing
+# Pull of a surface on a constant height, over the mean pull on single texels, up to which nothing
 # holds the surface.
-_NO_HOLD = 1e-9
+_MAX_LOOSE_PULL = 1e-9
 
 
 class StaticSurface:
@@ -47,7 +47,7 @@ class StaticSurface:
         diagonal = matrix.diagonal()
         pull = np.bincount(self._part, matrix @ np.ones(len(diagonal)), len(kept_parts))
         mean_pull = np.bincount(self._part, diagonal, len(kept_parts))
-        floats = (pull <= _NO_HOLD * mean_pull) & (mean_pull > 0)
+        floats = (pull <= _MAX_LOOSE_PULL * mean_pull) & (mean_pull > 0)
         if (floats & ~kept_parts).any():
             raise SolverError(
                 "nothing holds the surface, so that a force moves it for ever: give the material "
@@ -59,10 +59,12 @@ class StaticSurface:
             texel = np.flatnonzero(self._part == k)[0]
             tie[texel] = diagonal[texel]
         self._solve = factorised(matrix + diags_array(tie))
-        self._even = np.zeros((len(self._kept), len(diagonal)))
+        # heights under an even pressure of 1, in each part that keeps its volume and is held
+        self._under_pressure = np.zeros((len(self._kept), len(diagonal)))
         for row, k in enumerate(self._kept):
             if not floats[k]:
-                self._even[row] = self._solve(np.where(self._part == k, self._areas, 0.0))
+                forces = np.where(self._part == k, self._areas, 0.0)
+                self._under_pressure[row] = self._solve(forces)
         self._floats = floats
 
     def _part_areas(self, operator: WaveOperator) -> Floats:
@@ -86,18 +88,19 @@ class StaticSurface:
         areas = self._areas
         for k in self._kept:
             if self._floats[k]:
-                here = self._part == k
-                mean = load[here].sum(axis=0) / areas[here].sum()
-                load[here] -= np.multiply.outer(areas[here], mean)
+                in_part = self._part == k
+                mean = load[in_part].sum(axis=0) / areas[in_part].sum()
+                load[in_part] -= np.multiply.outer(areas[in_part], mean)
         height = self._solve(load)
         for row, k in enumerate(self._kept):
-            here = self._part == k
-            volume = areas[here] @ height[here]
+            in_part = self._part == k
+            volume = areas[in_part] @ height[in_part]
             if self._floats[k]:
-                height[here] -= volume / areas[here].sum()
+                height[in_part] -= volume / areas[in_part].sum()
             else:
-                even = self._even[row][here]
-                height[here] -= np.multiply.outer(even, volume / (areas[here] @ even))
+                under_pressure = self._under_pressure[row][in_part]
+                pressure = volume / (areas[in_part] @ under_pressure)
+                height[in_part] -= np.multiply.outer(under_pressure, pressure)
         result = np.zeros((int(np.prod(self._shape)), *height.shape[1:]))
         result[self._moving] = height
         return result

@@ -18,8 +18,8 @@ from ..kernel import Bools, Floats, Floats32, Ints
 from .step import damped_step
 from .wave_operator import WaveOperator
 
-# Coefficients below this share of the greatest one are round-off.
-_ROUND_OFF = 1e-12
+# Coefficients up to this share of the greatest one are round-off.
+_MIN_COEFFICIENT_SHARE = 1e-12
 
 
 def kept_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
@@ -31,8 +31,8 @@ def kept_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
         raise SolverError(
             f"conserve_volume must be True, False or None (the default), got {shown(conserve)}"
         )
-    kept = operator.keeps_volume
-    return kept if conserve is None else np.full_like(kept, conserve)
+    default = operator.keeps_volume
+    return default if conserve is None else np.full_like(default, conserve)
 
 
 class VolumeBalance:
@@ -54,7 +54,8 @@ class VolumeBalance:
         self._kept = kept_parts(operator, conserve)
         self._parts = None if operator.parts is None else operator.parts.reshape(-1)
         self._inverse_density = operator.inverse_density.reshape(-1)
-        self._least = self._sum(operator.mass * operator.inverse_density * operator.response)
+        # change of momentum per amplitude of the response, weighed by one over the density
+        self._response_sum = self._sum(operator.mass * operator.inverse_density * operator.response)
 
     def counterpart(self, texels: Ints, momenta: Floats) -> float | Floats:
         """Amplitude of the operator's `response` that balances momenta [k] on some texels [k].
@@ -62,18 +63,18 @@ class VolumeBalance:
         [m/s], or for forces [m/s^2]; a number, or one for each part.
         """
         weighed = self._inverse_density[texels] * momenta
+        total = self._response_sum
         if self._parts is None:
-            return -float(weighed.sum()) / float(self._least) if self._least else 0.0
+            return -float(weighed.sum()) / float(total) if total else 0.0
         # bincount of no texels gives integers
-        sums = np.bincount(self._parts[texels], weighed, len(self._least)).astype(np.float64)
-        return np.divide(-sums, self._least, out=np.zeros_like(sums), where=self._least > 0)
+        sums = np.bincount(self._parts[texels], weighed, len(total)).astype(np.float64)
+        return np.divide(-sums, total, out=np.zeros_like(sums), where=total > 0)
 
     def balanced_velocity(self, field: Floats) -> Floats:
         """A velocity field [C, n, n] without its volume rate."""
         operator = self._operator
-        return field - operator.response * self._ratio(
-            operator.mass * operator.inverse_density * field, self._least
-        )
+        weighed = operator.mass * operator.inverse_density * field
+        return field - operator.response * self._ratio(weighed, self._response_sum)
 
     def balanced_height(self, field: Floats, areas: Floats) -> Floats:
         """A height field [C, n, n] without its mean."""
@@ -82,7 +83,7 @@ class VolumeBalance:
     def _sum(self, field: Floats) -> Floats:
         """Sum over the movable texels of each part, [p]; a number where there is one part.
 
-        0 where no volume is kept.
+        It is 0 where no volume is kept.
         """
         movable = self._operator.movable
         if self._parts is None:
@@ -102,28 +103,30 @@ class VolumeBalance:
 def balanced_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
     """Whether a pressure keeps the volume of each part while its waves run, [p].
 
-    The density varies, the part keeps its volume, and no clamp or uneven spring holds it.
+    A pressure does so if the density varies, the part keeps its volume, and no clamp or uneven
+    spring holds the part.
     """
-    kept = kept_parts(operator, conserve).copy()
+    balanced = kept_parts(operator, conserve).copy()
     if operator.density is None:
-        return np.zeros_like(kept)
+        return np.zeros_like(balanced)
     parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
-    for part in np.flatnonzero(kept):
-        kept[part] = _floats_freely(operator, parts == part)
-    return kept
+    for number in np.flatnonzero(balanced):
+        balanced[number] = _floats_freely(operator, parts == number)
+    return balanced
 
 
-# begins, texels, heights, velocities; see `volume_rate`
+# Begins, texels, heights, velocities; see `volume_rate`.
 VolumeRate: TypeAlias = tuple[Ints, Ints, Floats32, Floats32]
 
 
 def volume_rate(
     operator: WaveOperator, dt: float, conserve: bool | None = None
 ) -> VolumeRate | None:
-    """The pressure that keeps the volume over a substep dt [s], by heights and velocities.
+    """The pressure that keeps the volume over a substep dt [s], from heights and velocities.
 
-    None where nothing changes the volume, or no part keeps it. A part does not keep it where a
-    clamp holds some of it, or its stiffness varies: clamps and springs take up momentum themselves.
+    None where nothing changes the volume, or no part keeps its volume. A part does not keep it
+    where a clamp holds some of the part, or its stiffness varies: clamps and springs take up
+    momentum themselves.
 
     Returns
     -------
@@ -139,12 +142,12 @@ def volume_rate(
         return None
     parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
     count = int(parts.max()) + 1
-    kept = balanced_parts(operator, conserve)
+    balanced = balanced_parts(operator, conserve)
     decay, span = damped_step(operator, dt)
     weight = operator.mass * operator.inverse_density
     inertia = np.bincount(parts.reshape(-1), (weight * span * operator.response).reshape(-1), count)
     inverse_inertia = -1 / np.where(inertia > 0, inertia, 1)
-    scale = np.where(kept & (inertia > 0), inverse_inertia, 0)[parts]
+    scale = np.where(balanced & (inertia > 0), inverse_inertia, 0)[parts]
     moved = span * operator.inverse_density
     # less the part that an even surface has as well: its mean is damped, and swings on its spring
     heights = operator.link_force(moved) - weight * operator.stiffness * (span - _mean(span))
@@ -163,12 +166,12 @@ def volume_rate(
     return begins, texels, heights.astype(np.float32), velocities.astype(np.float32)
 
 
-def _floats_freely(operator: WaveOperator, own: Bools) -> bool:
-    """Whether no clamp holds a part of the surface, and its springs are alike; `own` [C, n, n]."""
-    movable = own & operator.movable
+def _floats_freely(operator: WaveOperator, part: Bools) -> bool:
+    """Whether no clamp holds the texels [C, n, n] of a part, and their springs are alike."""
+    movable = part & operator.movable
     if not movable.any():
         return False
-    is_anchored = operator.anchored[own].any()
+    is_anchored = operator.anchored[part].any()
     has_uneven_springs = np.ptp(operator.stiffness[movable]) > 0
     return not is_anchored and not has_uneven_springs
 
@@ -176,7 +179,7 @@ def _floats_freely(operator: WaveOperator, own: Bools) -> bool:
 def _without_round_off(coefficients: Floats) -> Floats:
     """The coefficients, changed in place: 0 where they are small against the greatest one."""
     sizes = np.abs(coefficients)
-    coefficients[sizes <= _ROUND_OFF * sizes.max(initial=0.0)] = 0.0
+    coefficients[sizes <= _MIN_COEFFICIENT_SHARE * sizes.max(initial=0.0)] = 0.0
     return coefficients
 
 

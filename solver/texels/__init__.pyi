@@ -10,11 +10,11 @@ from .atlas_file import (
 )
 from .barycentrics import barycentrics_at as barycentrics_at, barycentrics_in as barycentrics_in
 from .cells import (
-    EVEN as EVEN,
-    LEAST_AREA as LEAST_AREA,
+    EVENNESS as EVENNESS,
+    MAX_HOURGLASS_SHARE as MAX_HOURGLASS_SHARE,
+    MIN_AREA as MIN_AREA,
     PER_HOURGLASS as PER_HOURGLASS,
     PER_TINY as PER_TINY,
-    SHARE as SHARE,
     TINY as TINY,
     polygons as polygons,
     quad as quad,
@@ -50,7 +50,7 @@ from .moving import (
     interpolate as interpolate,
 )
 from .parts_mesh import PartsMesh as PartsMesh, parts_mesh as parts_mesh
-from .quad_pass import LEAST_RATIO as LEAST_RATIO
+from .quad_pass import MIN_AREA_RATIO as MIN_AREA_RATIO
 from .smoothing import smoothed as smoothed
 from .stencil import (
     LINK_ENDS as LINK_ENDS,
@@ -69,7 +69,7 @@ from .stretch import QUANTILES as QUANTILES, stretch_summary as stretch_summary
 from .texel_mesh import TexelGrid as TexelGrid, TexelMesh as TexelMesh
 from .texel_quality import folded_texels as folded_texels, texel_quality as texel_quality
 from .thickness import (
-    LEAST as LEAST,
+    MIN_MEDIAL_RADIUS as MIN_MEDIAL_RADIUS,
     half_thickness as half_thickness,
     half_thickness_at as half_thickness_at,
     medial_radius as medial_radius,

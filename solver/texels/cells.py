@@ -43,23 +43,23 @@ _FOUR = np.float32(4)
 # isotropic stencil, and 1/4 the longest time step.
 PER_HOURGLASS = np.float32(2.5)
 
-# Elongated quads get up to this share of the hourglass stiffness at which their own time step would
-# begin to get shorter.
-SHARE = np.float32(0.75)
+# Hourglass stiffness of an elongated quad, at most, over the stiffness at which the quad's own time
+# step would begin to get shorter.
+MAX_HOURGLASS_SHARE = np.float32(0.75)
 
 # A quad counts as uneven if the distance between the middles of its diagonals is more than
-# 1 / sqrt(EVEN), in units of the diagonals. In an even quad the hourglass share of linear functions
-# is of second order, and compensates a part of the error of wave speeds: on the sphere the error at
-# N = 64 is a third smaller with it.
-EVEN = np.float32(1000)
+# 1 / sqrt(EVENNESS), in units of the diagonals. In an even quad the hourglass share of linear
+# functions is of second order, and compensates a part of the error of wave speeds: on the sphere
+# the error at N = 64 is a third smaller with it.
+EVENNESS = np.float32(1000)
 
-# Least area of a cell, in units of the area of a square of its size: a cell folded to a line would
-# need an infinitely short time step.
-LEAST_AREA = np.float32(0.02)
+# Area of a cell, at least, in units of the area of a square of its size: a cell folded to a line
+# would need an infinitely short time step.
+MIN_AREA = np.float32(0.02)
 
 # Detours fade out in quads where |p|^2 |q|^2 - (p.q)^2 is below this share of |p|^2 |q|^2, with
 # diagonals p and q.
-FADED = np.float32(0.02)
+DETOUR_FADE = np.float32(0.02)
 
 # Area of a cell whose corners are one point.
 TINY_AREA = 1e-12
@@ -84,12 +84,16 @@ def quad(e: Vector, n: Vector, p: Vector, detours: Vector) -> tuple[Numbers, ...
 
     The links are the south, north, west and east side, the diagonal sw-ne and the diagonal se-nw.
     The corners se, nw and ne are at e, n and p from sw; `detours` are in the order of the links.
-    With diagonals p, q and u_p, u_q the differences along them, area |gradient|^2 is (|q|^2 u_p^2 -
-    2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|, and 2 u_p u_q is the sum of squared differences along
-    west and east, less that along south and north. The hourglass, less what the linear function of
-    that gradient has of it, is (1 + a, -1 + b, -1 - b, 1 - a) at sw, se, nw, ne, where a p + b q is
-    how far the quad is from a parallelogram, and next to none in an even one. A quad in one point
-    has neither.
+
+    Gradient: with diagonals p, q and the differences u_p, u_q along them, area |gradient|^2 is
+    (|q|^2 u_p^2 - 2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|. There 2 u_p u_q is the sum of the
+    squared differences along west and east, less the sum along south and north.
+
+    Hourglass: (1 + a, -1 + b, -1 - b, 1 - a) at sw, se, nw, ne. It is (1, -1, -1, 1) less the share
+    that the linear function with the same gradient has of it. The vector a p + b q is the distance
+    from a parallelogram, which hardly counts in an even quad.
+
+    A quad in one point has no stiffness of either kind.
     """
     q = subtract(n, e)
     north = subtract(p, n)
@@ -97,8 +101,8 @@ def quad(e: Vector, n: Vector, p: Vector, detours: Vector) -> tuple[Numbers, ...
     pp = dot(p, p)
     qq = dot(q, q)
     pq = dot(p, q)
-    flat = cross_length(p, q)
-    # the way between the diagonals' middles, twice; in a convex quad a and b lie between -1 and 1
+    cross_pq = cross_length(p, q)
+    # twice the way between the diagonals' middles; in a convex quad a and b lie between -1 and 1
     way = subtract(north, e)
     # what detours add to the squares of sides and diagonals, and so to the products of diagonals
     to_south = detours[0] * dot(e, e)
@@ -109,27 +113,27 @@ def quad(e: Vector, n: Vector, p: Vector, detours: Vector) -> tuple[Numbers, ...
     to_qq = detours[5] * qq
     to_pq = _HALF * (to_west + to_east - to_south - to_north)
     # detours fade out where they would leave no quad: in a quad p.q is less than |p| |q|
-    most = (pp + to_pp) * (qq + to_qq)
-    both = pq + to_pq
-    fit = np.minimum(
-        np.maximum((most - both * both) / (FADED * np.maximum(most, TINY)), ZERO), _ONE
-    )
+    limit = (pp + to_pp) * (qq + to_qq)
+    new_pq = pq + to_pq
+    room = limit - new_pq * new_pq
+    fit = np.minimum(np.maximum(room / (DETOUR_FADE * np.maximum(limit, TINY)), ZERO), _ONE)
     to_pp = fit * to_pp
     to_qq = fit * to_qq
     to_pq = fit * to_pq
-    square = np.maximum(
-        flat * flat + (to_pp * (qq + to_qq) + pp * to_qq - to_pq * (pq + pq + to_pq)), ZERO
-    )
+    # |p x q|^2 = |p|^2 |q|^2 - (p.q)^2, and what detours add to it
+    to_square = to_pp * (qq + to_qq) + pp * to_qq - to_pq * (pq + pq + to_pq)
+    square = np.maximum(cross_pq * cross_pq + to_square, ZERO)
     pp = pp + to_pp
     qq = qq + to_qq
     pq = pq + to_pq
     along_p = dot(way, p) + _HALF * fit * (to_east + to_north - to_south - to_west)
     along_q = dot(way, q) + _HALF * fit * (to_east + to_south - to_north - to_west)
-    twice = np.maximum(_TWO * np.maximum(np.sqrt(square), _HALF * LEAST_AREA * (pp + qq)), TINY)
+    thick = np.maximum(np.sqrt(square), _HALF * MIN_AREA * (pp + qq))
+    twice = np.maximum(_TWO * thick, TINY)  # 2 |p x q|, four times the area
     square = _QUARTER * twice * twice
     a = (along_p * qq - along_q * pq) / square
     b = (along_q * pp - along_p * pq) / square
-    uneven = EVEN * (a * a + b * b)
+    uneven = EVENNESS * (a * a + b * b)
     share = uneven / (uneven + _ONE)
     a = np.minimum(np.maximum(share * a, -_ONE), _ONE)
     b = np.minimum(np.maximum(share * b, -_ONE), _ONE)
@@ -160,10 +164,9 @@ def hourglass(pp: Numbers, qq: Numbers, pq: Numbers, area: Numbers) -> Numbers:
     d = _QUARTER * (pp - qq)
     in_time = both_sides * area / (_TWO * (area * area + _THREE * d * d))
     free = (a * a - d * d) / (_FOUR * a * area)
-    least = np.minimum(
-        in_time, np.maximum(SHARE * free, _TWO * area / (PER_HOURGLASS * both_sides))
-    )
-    return np.minimum(PER_TINY * (pp + qq), _ONE) * least
+    of_square = _TWO * area / (PER_HOURGLASS * both_sides)
+    stiffness = np.minimum(in_time, np.maximum(MAX_HOURGLASS_SHARE * free, of_square))
+    return np.minimum(PER_TINY * (pp + qq), _ONE) * stiffness
 
 
 @shared
@@ -188,7 +191,7 @@ def triangle(a: Vector, b: Vector, c: Vector) -> tuple[Numbers, Numbers, Numbers
     bc = subtract(c, b)
     double_area = cross_length(ab, ac)
     longest = np.maximum(np.maximum(dot(ab, ab), dot(ac, ac)), dot(bc, bc))
-    twice = np.maximum(2 * np.maximum(double_area, LEAST_AREA * longest), TINY_AREA)
+    twice = np.maximum(2 * np.maximum(double_area, MIN_AREA * longest), TINY_AREA)
     return dot(ab, ac) / twice, -dot(ab, bc) / twice, dot(ac, bc) / twice, double_area / 2
 
 
@@ -197,11 +200,13 @@ def polygons(corners: Floats) -> tuple[Floats, Floats]:
     """Link weights and shares of the area of m polygons in space [3, k, m].
 
     Weights [k (k - 1) / 2, m] are of the links of corners 0-1, 0-2 and so on, 1-2 and so on; shares
-    are [k, m].
+    of the area are [k, m].
 
     A virtual node in the middle cuts each polygon into triangles. It is an affine combination of
     the corners, so that linear functions stay exact, and is eliminated (Bunge, Herholz, Kazhdan and
-    Botsch 2020).
+    Botsch 2020). With the weights w_i of the corners in the node, and the cotangent weights s_i of
+    the spokes from the corners to the node, the elimination gives the link of the corners i and j
+    the weight w_j s_i + w_i s_j - w_i w_j sum s. A side of the polygon has its own weight, too.
     """
     _, count, number = corners.shape
     links = np.empty((count * (count - 1) // 2, number))
@@ -211,24 +216,24 @@ def polygons(corners: Floats) -> tuple[Floats, Floats]:
     for m in range(number):
         x = corners[:, :, m]
         shares = _virtual_node(x)
-        middle = _mean(x, shares)
-        inner = 0.0
+        node = _mean(x, shares)
+        node_area = 0.0
         total = 0.0
         link = 0
         for i in range(count):
             spokes[i] = 0.0
         for i in range(count):
             j = (i + 1) % count
-            to_j, to_i, sides[i], area = triangle(x[:, i], x[:, j], middle)
+            to_j, to_i, sides[i], area = triangle(x[:, i], x[:, j], node)
             spokes[j] += to_j
             spokes[i] += to_i
             areas[i, m] += area / 3
             areas[j, m] += area / 3
-            inner += area / 3
+            node_area += area / 3
         for i in range(count):
             total += spokes[i]
         for i in range(count):
-            areas[i, m] += shares[i] * inner
+            areas[i, m] += shares[i] * node_area
             for j in range(i + 1, count):
                 weight = (
                     shares[j] * spokes[i] + shares[i] * spokes[j] - shares[i] * shares[j] * total
@@ -250,7 +255,8 @@ def _virtual_node(corners: Floats) -> Floats:
     Of all weights that make it these are the most even ones.
     """
     count = corners.shape[1]
-    # |x - c| x side, squared: x' A x - 2 b' x, with A = sum of |s|^2 1 - s s'
+    # the sum over the sides s, from corners c, of |(x - c) x s|^2 is x' A x - 2 b' x + const., with
+    # A = sum of |s|^2 1 - s s' (`squares`) and b = sum of |s|^2 c - s (s.c) (`right`)
     squares = np.zeros((3, 3))
     right = np.zeros(3)
     spread = np.zeros((3, 3))
@@ -260,16 +266,17 @@ def _virtual_node(corners: Floats) -> Floats:
         weights[i] = 1 / count
     mean = _mean(corners, weights)
     for i in range(count):
-        here = subtract(corners[:, i], mean)
+        corner = subtract(corners[:, i], mean)
         side = subtract(corners[:, (i + 1) % count], corners[:, i])
         squared = dot(side, side)
-        along = dot(side, here)
+        along = dot(side, corner)
         for a in range(3):
             squares[a, a] += squared
-            right[a] += squared * here[a] - side[a] * along
+            right[a] += squared * corner[a] - side[a] * along
             for b in range(3):
                 squares[a, b] -= side[a] * side[b]
-                spread[a, b] += here[a] * here[b]
+                spread[a, b] += corner[a] * corner[b]
+    # the most even weights are linear in the corners' places
     slope = _solved(spread, _solved(squares, (right[0], right[1], right[2])))
     for i in range(count):
         weights[i] = 1 / count + dot(slope, subtract(corners[:, i], mean))
@@ -294,7 +301,7 @@ def _mean(corners: Floats, weights: Floats) -> tuple[float, float, float]:
 
 @kernel(no_cpython_wrapper=True)
 def _solved(matrix: Floats, right: Vector) -> tuple[float, float, float]:
-    """Solution of a symmetric positive semidefinite system [3, 3].
+    """Solution of a symmetric positive semidefinite system [3, 3], by elimination.
 
     It is next to 0 in directions that the system leaves open.
     """
@@ -315,7 +322,8 @@ def _solved(matrix: Floats, right: Vector) -> tuple[float, float, float]:
 def conductance(coefficients: Sequence[Floats], softening: Sequence[Floats]) -> Floats:
     """Harmonic mean of the coefficients at the corners of cells, as of media in series.
 
-    0 where a coefficient is 0. The mean is softened by the least of the factors at the corners.
+    It is 0 where a coefficient is 0, and is multiplied by the least of the softening factors at the
+    corners.
     """
     with np.errstate(divide="ignore"):
         resistance = sum(1 / coefficient for coefficient in coefficients)

@@ -50,7 +50,14 @@ _MAX_LACK_SHARE = 0.2
 _MAX_NEWTON_STEPS = 50
 
 # Halvings, in logarithms, of the range of bounds in which the lowest possible one is sought.
-_HALVINGS = 6
+_BOUND_HALVINGS = 6
+
+# Rounding error of the lack of a texel, over the sum of all lacks.
+_LACK_ROUNDOFF = 1e-9
+
+# The mean square of a mode of wave number k changes by the share 2 k^2 w, and the error of the
+# operator is the share k^2 h^2 / 12: w over this many h^2 is one such error.
+_ERRORS_PER_POTENTIAL = 24
 
 
 def evened_areas(areas: Floats, stencil: Stencil) -> Floats:
@@ -69,19 +76,21 @@ def evened_areas(areas: Floats, stencil: Stencil) -> Floats:
         return areas
     rate = pull / flat
     part = connected_components(matrix, directed=False)[1]
+    part_area = np.bincount(part, flat)
+    max_area = np.maximum(flat, _MAX_AREA * flat.mean())
+    max_change = _MAX_CHANGE * flat.mean() * flat.sum()
     best = flat
-    low = _TOLERATED_RATE * _bulk(rate, flat)
+    low = _TOLERATED_RATE * _bulk_rate(rate, flat)
     high = float(rate.max())
-    bound = max(low, _even(flat))  # beyond which texels are softened, if need be
-    for _ in range(_HALVINGS):
-        heaviest = np.maximum(flat, _MAX_AREA * flat.mean())
-        lack = np.minimum(pull / bound, heaviest) - flat
+    bound = max(low, _min_step_rate(flat))  # beyond which texels are softened, if need be
+    for _ in range(_BOUND_HALVINGS):
+        lack = np.minimum(pull / bound, max_area) - flat
         part_lack = np.bincount(part, np.maximum(lack, 0))
-        is_too_fast = part_lack > _MAX_LACK_SHARE * np.bincount(part, flat)
+        is_too_fast = part_lack > _MAX_LACK_SHARE * part_area
         lack[is_too_fast[part]] = -np.inf
-        w = _least_potential(matrix, lack)
-        if w is not None and 24 * (w @ flat) <= _MAX_CHANGE * flat.mean() * flat.sum():
-            best = flat + matrix @ w
+        potential = _least_potential(matrix, lack)
+        if potential is not None and _ERRORS_PER_POTENTIAL * (potential @ flat) <= max_change:
+            best = flat + matrix @ potential
             high = bound
         else:
             low = bound
@@ -92,29 +101,29 @@ def evened_areas(areas: Floats, stencil: Stencil) -> Floats:
 def _least_potential(matrix: csr_array, lack: Floats) -> Floats | None:
     """The least w >= 0 with K w >= lack, an obstacle problem; None if it is not found.
 
-    Newton's method finds where w is not 0 (Hintermueller, Ito and Kunisch 2002).
+    Newton's method finds the texels where w > 0 (Hintermueller, Ito and Kunisch 2002).
     """
     w = np.zeros_like(lack)
-    touching = lack > 0
+    is_positive = lack > 0
     for _ in range(_MAX_NEWTON_STEPS):
-        inside = np.flatnonzero(touching)
+        texels = np.flatnonzero(is_positive)
         w[:] = 0
-        if len(inside):
+        if len(texels):
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("error", MatrixRankWarning)
-                    w[inside] = spsolve(matrix[inside][:, inside].tocsc(), lack[inside])
+                    w[texels] = spsolve(matrix[texels][:, texels].tocsc(), lack[texels])
             except MatrixRankWarning:  # all of a part: nothing beside it gives mass
                 return None
-        before = touching
-        round_off = 1e-9 * np.abs(lack[inside]).sum()
-        touching = np.where(touching, w > 0, matrix @ w < lack - round_off)
-        if (touching == before).all():
+        was_positive = is_positive
+        round_off = _LACK_ROUNDOFF * np.abs(lack[texels]).sum()
+        is_positive = np.where(is_positive, w > 0, matrix @ w < lack - round_off)
+        if (is_positive == was_positive).all():
             return w
     return None
 
 
-def _even(areas: Floats) -> float:
+def _min_step_rate(areas: Floats) -> float:
     """Rate at which the time step is `_MIN_STEP_SHARE` of an even grid's."""
     return float(EVEN_RATE / (2 * areas.mean() * _MIN_STEP_SHARE**2))
 
@@ -140,13 +149,13 @@ def softening(rate: Floats, areas: Floats) -> Floats:
     lost = np.cumsum(shares) - rates * np.cumsum(shares / rates)  # [texels]
     allowed = _MAX_LOST_TEXELS * np.log2(rates[0] / rates) + 1e-9
     cheapest = float(rates[np.flatnonzero(lost <= allowed)[-1]])
-    bulk = _bulk(rate.ravel(), areas.ravel())
-    bound = min(cheapest, max(_NEEDLE_RATE * bulk, _even(areas)))
-    bound = max(bound, _TOLERATED_RATE * bulk)
+    bulk = _bulk_rate(rate.ravel(), areas.ravel())
+    needles = max(_NEEDLE_RATE * bulk, _min_step_rate(areas))
+    bound = max(min(cheapest, needles), _TOLERATED_RATE * bulk)
     return np.divide(bound, rate, out=np.ones_like(rate), where=rate > bound)
 
 
-def _bulk(rates: Floats, areas: Floats) -> float:
+def _bulk_rate(rates: Floats, areas: Floats) -> float:
     """The rate that the bulk of the surface, by area, has at most.
 
     By area, since tiny parts may have many texels.

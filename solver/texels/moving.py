@@ -13,12 +13,12 @@ from .barycentrics import barycentrics_in
 from .stencil import NO_LINKS, IrregularLinks, Stencil
 from .stiffness import CellCoefficient, TexelCells
 
-# Distance of a rest position from its triangle, in units of the size of the surface, from which on
+# Distance of a place at rest from its triangle, in units of the size of the surface, above which
 # the place keeps this distance; less is round-off.
-_OFF_TRIANGLE = 1e-9
+_MIN_OFFSET = 1e-9
 
-# Least length and area by which vectors are divided.
-_LEAST_DIVISOR = 1e-300
+# Lengths and areas by which vectors are divided, at least.
+_MIN_DIVISOR = 1e-300
 
 
 class SurfaceRide:
@@ -62,8 +62,8 @@ class SurfaceRide:
             weights[on_rim] = barycentrics_in(V[F[triangle]], closest)
         weights[nothing] = np.nan
         # images of a periodic surface keep their way to the texels that they show
-        shown = atlas.positions.reshape(-1, 3)[halo]
-        shift = np.where((rim | nothing)[:, None], 0.0, places - shown)
+        texel_places = atlas.positions.reshape(-1, 3)[halo]
+        shift = np.where((rim | nothing)[:, None], 0.0, places - texel_places)
         self._images = np.flatnonzero(shift.any(axis=1))
         self._shift = shift[self._images].T
         self.corners = corners.astype(np.int32)
@@ -71,10 +71,11 @@ class SurfaceRide:
         # ways from the triangles to the places: along the first side of the triangle, across it,
         # and along its normal, in units of the root of twice its area
         self._offsets = np.zeros((0, 3))
-        off = np.nan_to_num(places - shift - np.einsum("ij,ijk->ik", weights, V[corners]))
-        if np.abs(off).max(initial=0.0) > _OFF_TRIANGLE * np.ptp(V, axis=0).max():
+        on_triangles = np.einsum("ij,ijk->ik", weights, V[corners])
+        offsets = np.nan_to_num(places - shift - on_triangles)  # [m]
+        if np.abs(offsets).max(initial=0.0) > _MIN_OFFSET * np.ptp(V, axis=0).max():
             frames = np.swapaxes(_frames(V, self.corners), 1, 2)
-            self._offsets = np.linalg.solve(frames, off[..., None])[..., 0]
+            self._offsets = np.linalg.solve(frames, offsets[..., None])[..., 0]
         self.on_triangles = not (len(self._offsets) or len(self._images))
 
     def around(self, V: Floats) -> Floats:
@@ -193,11 +194,11 @@ def _frames(V: Floats, corners: NDArray[np.integer]) -> Floats:
     along = x[:, 1] - x[:, 0]
     across = x[:, 2] - x[:, 0]
     normal = np.cross(along, across)
-    double = np.linalg.norm(normal, axis=1)[:, None]
-    normal /= np.maximum(double, _LEAST_DIVISOR)
-    along /= np.maximum(np.linalg.norm(along, axis=1)[:, None], _LEAST_DIVISOR)
+    double_area = np.linalg.norm(normal, axis=1)[:, None]
+    normal /= np.maximum(double_area, _MIN_DIVISOR)
+    along /= np.maximum(np.linalg.norm(along, axis=1)[:, None], _MIN_DIVISOR)
     units = np.stack([along, np.cross(normal, along), normal], axis=1)
-    return np.sqrt(double)[..., None] * units
+    return np.sqrt(double_area)[..., None] * units
 
 
 @kernel

@@ -10,7 +10,7 @@ from ..kernel import Floats, Floats32, kernel
 from .cells import quad
 
 # Least area of a cell over its area at rest: no density grows beyond a thousand times that at rest.
-LEAST_RATIO = np.float32(1e-3)
+MIN_AREA_RATIO = np.float32(1e-3)
 
 # Places of moving texels that are worked out at once, in whole rows: they stay in the fastest
 # memory.
@@ -153,7 +153,7 @@ def _scale(sides: Floats32, cells: QuadCells, first: int, count: int, factor: Fl
     area = sides[6]
     power = np.float32(cells.power)
     for c in range(count):
-        ratio = max(area[c] * per_area[c], LEAST_RATIO)
+        ratio = max(area[c] * per_area[c], MIN_AREA_RATIO)
         factor[c] = conductance[c] / ratio if power == -_ONE else conductance[c] * ratio**power
         area[c] = _QUARTER * area[c] if per_area[c] > 0 else _ZERO
     for k in range(6):

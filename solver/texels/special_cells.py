@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..kernel import Floats, Ints
 from ..mesh.vectors import dot
-from .cells import LEAST_AREA, TINY_AREA, ZERO, polygons, quad, quad_area, triangle
+from .cells import MIN_AREA, TINY_AREA, ZERO, polygons, quad, quad_area, triangle
 from .stencil import crossing_links
 from .topology import TRIANGLE, TexelTopology
 
@@ -118,9 +118,10 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
         return
     yield SpecialCells(corners, _areas, (_NOTHING, _NOTHING), to_texels)
     for (i, j, p, q), link in zip(_STRIPS, LINKS[:4], strict=True):
-        here = ~at_rim[i] & ~at_rim[j] & at_rim[p] & at_rim[q]
-        places = _link_places(topology, cells[:, here], (link,))
-        yield SpecialCells(corners[[i, j, p, q]][:, here], _strips, places, (_NOTHING, _NOTHING))
+        is_strip = ~at_rim[i] & ~at_rim[j] & at_rim[p] & at_rim[q]
+        strip_corners = corners[[i, j, p, q]][:, is_strip]
+        places = _link_places(topology, cells[:, is_strip], (link,))
+        yield SpecialCells(strip_corners, _strips, places, (_NOTHING, _NOTHING))
 
 
 def _triangles(topology: TexelTopology) -> SpecialCells:
@@ -140,8 +141,8 @@ def _triangles(topology: TexelTopology) -> SpecialCells:
     )
     # the east or west side, and the north or south one
     links = _link_places(topology, np.stack([chart, r, c]), ((1, 0, c == 0), (0, r == 0, 0)))
-    own = np.arange(len(chart)), topology.halo.reshape(-1)[corners[0]]
-    return SpecialCells(corners, _triangle, links, own)
+    shares = np.arange(len(chart)), topology.halo.reshape(-1)[corners[0]]
+    return SpecialCells(corners, _triangle, links, shares)
 
 
 def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
@@ -150,8 +151,8 @@ def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
     Their sides are links of the nine points, their diagonals are not.
     """
     for count in sorted({len(polygon) for polygon in topology.polygons}):
-        alike = [polygon for polygon in topology.polygons if len(polygon) == count]
-        texels = np.stack(alike, axis=1)
+        of_this_size = [polygon for polygon in topology.polygons if len(polygon) == count]
+        texels = np.stack(of_this_size, axis=1)
         first, second = np.triu_indices(count, 1)
         pairs = np.stack([texels[first], texels[second]], axis=-1).reshape(-1, 2)
         link, places = crossing_links(topology).between(pairs)
@@ -203,10 +204,11 @@ def _strips(x: Floats) -> tuple[Floats, Floats, Floats]:
     link = x[:, 1] - x[:, 0]
     rim = x[:, 3] - x[:, 2]
     area = quad_area(*_from_first(x))
-    squared = dot(rim, rim)
-    along = dot(rim, link) ** 2 / np.maximum(squared, TINY_AREA)
-    least = LEAST_AREA * np.maximum(squared, dot(link, link))
-    weight = np.where(squared > 0, area / np.maximum(np.maximum(along, least), TINY_AREA), 0.0)
+    rim_squared = dot(rim, rim)
+    along_squared = dot(rim, link) ** 2 / np.maximum(rim_squared, TINY_AREA)
+    min_along_squared = MIN_AREA * np.maximum(rim_squared, dot(link, link))
+    divisor = np.maximum(np.maximum(along_squared, min_along_squared), TINY_AREA)
+    weight = np.where(rim_squared > 0, area / divisor, 0.0)
     return weight[None], np.zeros((0, len(weight))), area
 
 

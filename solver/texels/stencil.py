@@ -1,6 +1,6 @@
-"""The symmetric nine-point stencil of a texel mesh, and irregular links beyond the nine points.
+"""The symmetric nine-point stencil of a texel mesh, and the irregular links beyond it.
 
-Irregular links lie round irregular vertices.
+Irregular links lie round irregular vertices, where other than four charts meet.
 
 A stencil's weights are [C, 4, n + 1, n + 1]: those of the links of place (r, c) of a chart with
 halo to the east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east (r, c)-(r + 1, c + 1), and
@@ -46,20 +46,21 @@ LINK_ENDS = [
 # pattern has it.
 EVEN_RATE = 6.4
 
-# Least texels along a chart's side for which Lanczos iteration is better than Gershgorin's bound.
-_LANCZOS_FROM = 6
+# Texels along a chart's side, at least, for which Lanczos iteration is better than Gershgorin's
+# bound.
+_MIN_LANCZOS_TEXELS = 6
 
-# Residual of the largest eigenvalue, as a share of it.
-_RESIDUAL = 2e-3
+# Residual of the largest eigenvalue at which the iteration ends, as a share of the eigenvalue.
+_MAX_RESIDUAL = 2e-3
 
-# Share by which the estimate is raised, so that it is an upper bound.
-_MARGIN = 1.005
+# Factor by which the estimate is raised, so that it is an upper bound.
+_UPPER_BOUND_FACTOR = 1.005
 
 # Lanczos steps between two looks at the eigenvalue.
-_STEPS_TO_LOOK = 5
+_STEPS_BETWEEN_LOOKS = 5
 
-# Lanczos steps at most; then Gershgorin's bound stands.
-_MOST_STEPS = 1000
+# Lanczos steps, at most; then Gershgorin's bound stands.
+_MAX_LANCZOS_STEPS = 1000
 
 
 class IrregularLinks(NamedTuple):
@@ -89,11 +90,15 @@ class IrregularLinks(NamedTuple):
     @classmethod
     def of(cls, ends: Ints, weights: Floats) -> IrregularLinks:
         """Sort links [k, 2] with weights [k]."""
-        both = np.concatenate([ends, ends[:, ::-1]])
-        twice = np.tile(weights, 2)
-        order = np.lexsort((both[:, 1], both[:, 0]))
-        texels, begins = np.unique(both[order, 0], return_index=True)
-        return cls(texels, np.append(begins, len(both)), both[order, 1], twice[order])
+        both_ways = np.concatenate([ends, ends[:, ::-1]])
+        order = np.lexsort((both_ways[:, 1], both_ways[:, 0]))
+        texels, begins = np.unique(both_ways[order, 0], return_index=True)
+        return cls(
+            texels=texels,
+            begins=np.append(begins, len(both_ways)),
+            others=both_ways[order, 1],
+            weights=np.tile(weights, 2)[order],
+        )
 
     @classmethod
     def joined(cls, first: IrregularLinks, second: IrregularLinks) -> IrregularLinks:
@@ -125,8 +130,8 @@ def link_lengths(topology: TexelTopology, halo_positions: Floats) -> Floats:
 def link_exists(topology: TexelTopology, link: int) -> Bools:
     """Links between two texels that include a texel of the chart, [C, n + 1, n + 1]."""
     a, b = LINK_ENDS[link]
-    there = (topology.halo >= 0) & ~topology.rim
-    return there[a] & there[b] & (topology.own[a] | topology.own[b])
+    has_texel = (topology.halo >= 0) & ~topology.rim
+    return has_texel[a] & has_texel[b] & (topology.own[a] | topology.own[b])
 
 
 @functools.lru_cache(maxsize=4)  # asked for in every step, where a surface moves
@@ -170,9 +175,9 @@ class CrossingLinks(NamedTuple):
 
         A pair without a link across a side has no copies.
         """
-        wanted = pairs.min(axis=1) * self.size + pairs.max(axis=1)
-        link = np.searchsorted(self.keys, wanted)
-        pair = np.flatnonzero(np.append(self.keys, -1)[link] == wanted)
+        keys = pairs.min(axis=1) * self.size + pairs.max(axis=1)
+        link = np.searchsorted(self.keys, keys)
+        pair = np.flatnonzero(np.append(self.keys, -1)[link] == keys)
         first = self.begins[link[pair]]
         count = np.diff(self.begins)[link[pair]]
         nth = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
@@ -183,7 +188,8 @@ class CrossingLinks(NamedTuple):
         counts = np.diff(self.begins)
         flat = weights.reshape(-1)
         link = np.repeat(np.arange(len(counts)), counts)
-        flat[self.copies] = (np.bincount(link, flat[self.copies], len(counts)) / counts)[link]
+        means = np.bincount(link, flat[self.copies], len(counts)) / counts
+        flat[self.copies] = means[link]
 
 
 @functools.lru_cache(maxsize=4)
@@ -220,9 +226,9 @@ def largest_eigenvalue(
 ) -> float:
     """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force.
 
-    By plain Lanczos iteration, without a basis that is kept orthogonal: lost orthogonality repeats
-    eigenvalues and makes no new ones (Paige 1972). Sums are NumPy's own: the threads of BLAS wait
-    for each other where other processes use the cores.
+    Plain Lanczos iteration finds it, without keeping the basis orthogonal: lost orthogonality
+    repeats eigenvalues and makes no new ones (Paige 1972). Sums are NumPy's own: the threads of
+    BLAS wait for each other where other processes use the cores.
 
     Parameters
     ----------
@@ -239,29 +245,31 @@ def largest_eigenvalue(
     """
     if not free.any():
         return 0.0
-    if bound == 0 or (mass.shape[1] < _LANCZOS_FROM and not loose):
+    if bound == 0 or (mass.shape[1] < _MIN_LANCZOS_TEXELS and not loose):
         return bound
     weight = free / np.sqrt(mass)
     start = np.random.default_rng(0).standard_normal(mass.size)
-    before = np.zeros_like(start)
+    previous = np.zeros_like(start)
     vector = start / np.sqrt((start * start).sum())
+    # the tridiagonal matrix of the force in the basis of the vectors
     diagonal: list[float] = []
-    side: list[float] = []
-    for step in range(1, _MOST_STEPS + 1):
-        pull = -(force(vector.reshape(weight.shape) * weight) * weight).ravel()
-        rest = pull - (side[-1] if side else 0.0) * before
-        diagonal.append(float((vector * rest).sum()))
-        rest -= diagonal[-1] * vector
-        length = float(np.sqrt((rest * rest).sum()))
-        if step % _STEPS_TO_LOOK == 0 or length == 0.0:
+    off_diagonal: list[float] = []
+    for step in range(1, _MAX_LANCZOS_STEPS + 1):
+        image = -(force(vector.reshape(weight.shape) * weight) * weight).ravel()
+        new = image - (off_diagonal[-1] if off_diagonal else 0.0) * previous
+        diagonal.append(float((vector * new).sum()))
+        new -= diagonal[-1] * vector
+        length = float(np.sqrt((new * new).sum()))
+        if step % _STEPS_BETWEEN_LOOKS == 0 or length == 0.0:
             top, vectors = eigh_tridiagonal(
-                diagonal, side, select="i", select_range=(step - 1, step - 1)
+                diagonal, off_diagonal, select="i", select_range=(step - 1, step - 1)
             )
-            if length * abs(vectors[-1, 0]) <= _RESIDUAL * abs(top[0]):
-                return float(np.clip(_MARGIN * top[0], 0, bound))
-        side.append(length)
-        before = vector
-        vector = rest / length
+            residual = length * abs(vectors[-1, 0])
+            if residual <= _MAX_RESIDUAL * abs(top[0]):
+                return float(np.clip(_UPPER_BOUND_FACTOR * top[0], 0, bound))
+        off_diagonal.append(length)
+        previous = vector
+        vector = new / length
     return float(bound)
 
 

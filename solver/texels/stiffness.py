@@ -18,13 +18,13 @@ import numpy as np
 
 from ..kernel import Floats, Floats32, Ints
 from .cells import conductance, quad, quad_area
-from .quad_pass import LEAST_RATIO, QuadCells, quad_pass
+from .quad_pass import MIN_AREA_RATIO, QuadCells, quad_pass
 from .special_cells import LINKS, at_corners, special_cells
 from .stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from .topology import TexelTopology
 
 # Cells at rest that are worked out at once: they stay in the processor's cache.
-_BLOCK = 2**13
+_CELLS_IN_BLOCK = 2**13
 
 # 0 in single precision, so that an array of single numbers stays one.
 _ZERO = np.float32(0)
@@ -55,22 +55,23 @@ class TexelCells:
     ) -> None:
         self.topology = topology
         self._positions = halo_positions
-        self._detours = (
-            np.zeros((4, *topology.halo.shape), np.float32) if detours is None else detours
-        )
+        if detours is None:
+            detours = np.zeros((4, *topology.halo.shape), np.float32)
+        self._detours = detours
         charts, n, _ = topology.shape
         self._shape = (charts, 4, n + 1, n + 1)
         self._special = special_cells(topology, halo_positions)
-        self._whole = np.logical_and.reduce(at_corners((topology.halo >= 0) & ~topology.rim))
+        has_texel = (topology.halo >= 0) & ~topology.rim
+        self._whole = np.logical_and.reduce(at_corners(has_texel))
         self._whole &= ~topology.still[:, None, None]
         extent = float(np.ptp(halo_positions[:, 1:-1, 1:-1], axis=(0, 1, 2)).max())
         self._scale = 1.0
         if extent > 0:
             self._scale = float(np.float32(np.sqrt(topology.texel_count) / extent))
         # irregular links whose weights are their numbers in the order of the special cells
-        ends = np.concatenate(
-            [np.zeros((0, 2), np.int64), *(cells.irregular[1] for cells in self._special)]
-        )
+        ends_by_kind = [np.zeros((0, 2), np.int64)]
+        ends_by_kind += [cells.irregular[1] for cells in self._special]
+        ends = np.concatenate(ends_by_kind)
         self._links = IrregularLinks.of(ends, np.arange(len(ends), dtype=np.float64))
 
     @functools.cached_property
@@ -91,13 +92,13 @@ class TexelCells:
         weights = np.zeros(self._shape)
         values = self.topology.with_halo(values)
         softening = self.topology.with_halo(softening)
-        for charts, rows, part, ways in self._blocks():
+        for charts, rows, texels, ways in self._blocks():
             above = slice(rows.start + 1, rows.stop + 1)
-            factor = conductance(at_corners(values[part]), at_corners(softening[part]))
-            detours = [
-                at_corners(self._detours[link, *part])[2 * down + right]
-                for link, down, right in LINKS
-            ]
+            factor = conductance(at_corners(values[texels]), at_corners(softening[texels]))
+            detours = []
+            for link, down, right in LINKS:
+                corner = 2 * down + right
+                detours.append(at_corners(self._detours[link, *texels])[corner])
             with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
                 quads = quad(*ways, detours)
                 links = np.where(self._whole[charts, rows], np.stack(quads[:6]), 0.0)
@@ -146,7 +147,7 @@ class TexelCells:
         Only the places at `special_places` of the coordinates around are read.
         """
         weights = self._empty
-        (quads, special) = coefficient
+        quads, special = coefficient
         links = self._add_special(around.reshape(3, -1), special, quads.power, weights, None)
         values = weights.reshape(-1)[self.special_links]
         weights.reshape(-1)[self.special_links] = 0.0
@@ -155,11 +156,9 @@ class TexelCells:
     @functools.cached_property
     def special_places(self) -> Ints:
         """Flat places, of a field with halo, of the corners of all cells but the quads."""
-        return np.unique(
-            np.concatenate(
-                [np.zeros(0, np.int64), *(each.corners.ravel() for each in self._special)]
-            )
-        )
+        places = [np.zeros(0, np.int64)]
+        places += [cells.corners.ravel() for cells in self._special]
+        return np.unique(np.concatenate(places))
 
     @functools.cached_property
     def special_links(self) -> Ints:
@@ -167,12 +166,12 @@ class TexelCells:
 
         All copies of a link count.
         """
-        touched = np.zeros(self._shape)
-        crossing = crossing_links(self.topology)
+        is_special = np.zeros(self._shape)
         for cells in self._special:
-            touched.reshape(-1)[cells.links[1]] = 1.0
-        crossing.level(touched)
-        return np.flatnonzero(touched)
+            _, places = cells.links
+            is_special.reshape(-1)[places] = 1.0
+        crossing_links(self.topology).level(is_special)
+        return np.flatnonzero(is_special)
 
     @functools.cached_property
     def _empty(self) -> Floats:
@@ -228,46 +227,49 @@ class TexelCells:
     ) -> IrregularLinks:
         """Add the special cells to weights and areas, and return the irregular links.
 
-        Makes the copies of each link agree.
+        Afterwards the copies of each link agree.
         """
         flat = weights.reshape(-1)
         irregular = [np.zeros(0)]
-        of_polygons = []
+        polygon_links = []
         for kind, (cells, factor) in enumerate(zip(self._special, factors, strict=True)):
             links, shares, area = cells.weigh(places, self._scale)
             if power:
-                ratio = np.maximum(area * self._special_per_area[kind], LEAST_RATIO)
+                ratio = np.maximum(area * self._special_per_area[kind], MIN_AREA_RATIO)
                 factor = factor * ratio**power
             values = (factor * links).ravel()
             if areas is not None:
                 np.add.at(areas.reshape(-1), cells.shares[1], shares.ravel()[cells.shares[0]])
             irregular.append(values[cells.irregular[0]])
             if cells.on_all_copies:
-                of_polygons.append((cells.links[1], values[cells.links[0]]))
+                polygon_links.append((cells.links[1], values[cells.links[0]]))
             else:
                 np.add.at(flat, cells.links[1], values[cells.links[0]])
         flat[missing_links(self.topology)] = 0.0
         crossing_links(self.topology).level(weights)
-        for link_places, values in of_polygons:
+        for link_places, values in polygon_links:
             np.add.at(flat, link_places, values)
         order = self._links.weights.astype(np.int64)
         return self._links._replace(weights=np.concatenate(irregular)[order])
 
     def _blocks(self) -> Iterator[tuple[slice, slice, tuple[slice, slice], list[Floats]]]:
-        """Blocks of cells: charts, rows, both as a part of a field with halo, and scaled ways.
+        """Blocks of cells: their charts, their rows, their texels, and ways between these.
 
-        The part has one row of texels more than there are rows of cells. The ways are the
-        arguments of `quad`.
+        The texels are slices of a field with halo, with one row more than there are rows of cells.
+        The ways are scaled, and are the arguments of `quad`.
         """
         charts, _, size, _ = self._shape
-        together = max(1, _BLOCK // size**2)
-        high = max(1, _BLOCK // size)
-        for chart in range(0, charts, together):
-            for row in range(0, size, high):
-                rows = slice(row, min(row + high, size))
-                part = slice(chart, min(chart + together, charts)), slice(row, rows.stop + 1)
-                x = at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
-                yield part[0], rows, part, [corner - x[0] for corner in x[1:]]
+        charts_in_block = max(1, _CELLS_IN_BLOCK // size**2)
+        rows_in_block = max(1, _CELLS_IN_BLOCK // size)
+        for first_chart in range(0, charts, charts_in_block):
+            block_charts = slice(first_chart, min(first_chart + charts_in_block, charts))
+            for first_row in range(0, size, rows_in_block):
+                rows = slice(first_row, min(first_row + rows_in_block, size))
+                texels = block_charts, slice(first_row, rows.stop + 1)
+                positions = np.moveaxis(self._positions[texels], -1, 0)
+                south_west, *others = at_corners(self._scale * positions)
+                ways = [corner - south_west for corner in others]
+                yield block_charts, rows, texels, ways
 
 
 def _with_zeros(quads: Floats) -> Floats32:

@@ -28,40 +28,32 @@ from .smoothing import smoothed
 # instance.
 _DETAIL = 0.04
 
-# Least radius of a medial ball: a ball that touches two points a detail apart has half the detail
-# as its radius.
-LEAST = _DETAIL / 2
+# Radius of a medial ball, at least: a ball that touches two points a detail apart has half the
+# detail as its radius.
+MIN_MEDIAL_RADIUS = _DETAIL / 2
 
-# Greatest radius of a medial ball.
-_MOST_RADIUS = 0.55
+# Radius of a medial ball, at most.
+_MAX_MEDIAL_RADIUS = 0.55
 
-# Points among which medial balls are sought, at most about so many.
-_POINTS = 8_000
+# Number of points among which medial balls are sought, at most, roughly.
+_MAX_POINTS = 8_000
 
-# Rounds of shrinking, by which every ball has stopped to shrink.
-_MOST_ROUNDS = 12
+# Rounds in which balls shrink, at most: by then every ball has stopped.
+_MAX_SHRINKING_ROUNDS = 12
 
 # Share of its radius by which a ball must shrink to go on.
-_TOLERANCE = 1e-3
+_MIN_SHRINKAGE = 1e-3
 
 # Depth below the surface at which a ray to the other side starts.
 _RAY_START = 1e-3
 
-# Least and greatest half thickness.
-_LEAST_HALF = 0.01
-_MOST_HALF = 0.55
+# Half thickness of an object, at least and at most.
+_MIN_HALF_THICKNESS = 0.01
+_MAX_HALF_THICKNESS = 0.55
 
-# Least thickness of a layer. A body that lies so little above the surface counts as touching it.
-_LEAST_THICKNESS = 1e-4
-
-# A valid body, or several, inside an object.
-_BODIES = Valid(
-    lambda value: all(
-        isinstance(each, Mesh | Volume)
-        for each in (value if isinstance(value, Sequence) else [value])
-    ),
-    "a Mesh, a Volume, or several of them",
-)
+# Thickness of a layer, at least. A body that lies so little above the surface counts as touching
+# the surface.
+_MIN_LAYER_THICKNESS = 1e-4
 
 
 @kept_with
@@ -71,18 +63,19 @@ def medial_radius(atlas: Atlas) -> NDArray[np.float32]:
     [C, n, n]; the lesser one of the balls inside and outside. A point that moves along its normal
     by less than this radius is still closer to its start than to any other place, so that no two
     points meet. Radii are found by shrinking balls (Ma, Bae and Choi 2012, "3D medial axis point
-    approximation using nearest neighbors and the normal field"), from `LEAST` to 0.55 of the
-    longest extent of the surface.
+    approximation using nearest neighbors and the normal field"). They are `MIN_MEDIAL_RADIUS` to
+    0.55, as shares of the longest extent of the surface.
     """
     size = float(np.ptp(atlas.mesh.V, axis=0).max())
-    stride = int(np.ceil(np.sqrt(atlas.areas.size / _POINTS)))
+    stride = int(np.ceil(np.sqrt(atlas.areas.size / _MAX_POINTS)))
     points = atlas.positions[:, ::stride, ::stride].reshape(-1, 3)
     normals = atlas.normals[:, ::stride, ::stride].reshape(-1, 3)
     tree = cKDTree(points)
-    inside = _shrunk(tree, points, -1.0 * normals, size)
-    outside = _shrunk(tree, points, 1.0 * normals, size)
+    radius_inside = _shrunk(tree, points, -normals, size)
+    radius_outside = _shrunk(tree, points, normals, size)
+    radius = np.minimum(radius_inside, radius_outside)
     _, nearest = tree.query(atlas.positions.reshape(-1, 3))
-    curvature = 1 / np.minimum(inside, outside)[nearest].reshape(atlas.areas.shape)
+    curvature = 1 / radius[nearest].reshape(atlas.areas.shape)
     return (1 / smoothed(atlas.texels.topology, curvature)).astype(np.float32)
 
 
@@ -91,15 +84,15 @@ def _shrunk(tree: cKDTree, points: Floats, normals: Floats, size: float) -> Floa
 
     Each ball shrinks until no point lies in it.
     """
-    radius = np.full(len(points), _MOST_RADIUS * size)
+    radius = np.full(len(points), _MAX_MEDIAL_RADIUS * size)
     active = np.arange(len(points))
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MAX_SHRINKING_ROUNDS):
         center = points[active] + normals[active] * radius[active, None]
         distance, nearest = tree.query(center)
         away = points[nearest] - points[active]
         squared = (away**2).sum(axis=1)
         depth = (away * normals[active]).sum(axis=1)
-        is_inside = distance < (1 - _TOLERANCE) * radius[active]
+        is_inside = distance < (1 - _MIN_SHRINKAGE) * radius[active]
         is_detail = squared <= (_DETAIL * size) ** 2
         within = is_inside & ~is_detail & (depth > 0)
         active = active[within]
@@ -137,7 +130,7 @@ def half_thickness_at(mesh: Mesh, points: Floats, normals: Floats) -> Floats:
     starts = (points - middle) / size - _RAY_START * normals
     distance = scene.distances(starts, -normals)
     half = (distance.astype(np.float64) + _RAY_START) / 2
-    return size * np.clip(half, _LEAST_HALF, _MOST_HALF)
+    return size * np.clip(half, _MIN_HALF_THICKNESS, _MAX_HALF_THICKNESS)
 
 
 def _are_limits(value: Any) -> bool:
@@ -149,11 +142,17 @@ def _are_limits(value: Any) -> bool:
         return False
 
 
-_LIMITS = Valid(_are_limits, "a least and a greatest thickness [m], 0 or greater")
+def _are_bodies(value: Any) -> bool:
+    """Whether a value is a body, or a sequence of bodies."""
+    bodies = value if isinstance(value, Sequence) else [value]
+    return all(isinstance(body, Mesh | Volume) for body in bodies)
 
 
 @checked(
-    AtlasError, atlas=instance(Atlas, ", as `build_atlas` makes it"), inside=_BODIES, limits=_LIMITS
+    AtlasError,
+    atlas=instance(Atlas, ", as `build_atlas` makes it"),
+    inside=Valid(_are_bodies, "a Mesh, a Volume, or several of them"),
+    limits=Valid(_are_limits, "a least and a greatest thickness [m], 0 or greater"),
 )
 def thickness_map(
     atlas: Atlas,
@@ -162,7 +161,7 @@ def thickness_map(
 ) -> NDArray[np.float64]:
     """Way from each texel along the inward normal to the body inside [m], [C, n, n].
 
-    Smoothed over a few texels.
+    It is smoothed over a few texels.
 
     Parameters
     ----------
@@ -193,7 +192,7 @@ def thickness_map(
     points = atlas.positions.reshape(-1, 3)
     normals = atlas.normals.reshape(-1, 3)
     size = float(np.ptp(points, axis=0).max())
-    way, out = _cast(corners, points, -normals, size)
+    way, sticks_out = _cast(corners, points, -normals, size)
     met = np.isfinite(way)
     if not met.any():
         raise AtlasError(
@@ -201,13 +200,13 @@ def thickness_map(
             "surface, in the same frame and in metres; the surface goes from "
             f"{points.min(axis=0).round(4)} to {points.max(axis=0).round(4)}"
         )
-    if out.any() and limits[0] == 0:
+    if sticks_out.any() and limits[0] == 0:
         message = (
-            f"the inner body reaches out of the surface at {out.mean():.1%} of the texels, so "
-            "no layer is left: it must lie within the surface"
+            f"the inner body reaches out of the surface at {sticks_out.mean():.1%} of the texels, "
+            "so no layer is left: it must lie within the surface"
         )
         warn_caller(message)
-    way = np.clip(way, max(limits[0], _LEAST_THICKNESS * size), limits[1])
+    way = np.clip(way, max(limits[0], _MIN_LAYER_THICKNESS * size), limits[1])
     if np.isinf(way).any():
         greatest = float(way[met].max())
         message = (
@@ -220,13 +219,14 @@ def thickness_map(
 
 
 def _cast(corners: Floats, points: Floats, ways: Floats, size: float) -> tuple[Floats, Bools]:
-    """Distance [m] from points along unit ways to triangles [m, 3, 3], and which begin inside.
+    """Distances from points [k, 3] [m] along unit ways [k, 3] to triangles [m, 3, 3].
 
-    Infinite where a ray meets no triangle. Embree finds the triangle in float32; the distance to
-    its plane is in float64.
+    Returns the distances [k] [m], and which rays start inside of the body [k]. The distance is
+    infinite where a ray meets no triangle, and 0 where it starts inside. Embree finds the triangle
+    in float32; the distance to its plane is in float64.
     """
     middle = points.mean(axis=0)
-    starts = points - _LEAST_THICKNESS * size * ways
+    starts = points - _MIN_LAYER_THICKNESS * size * ways
     triangle, near, _, _ = RayScene((corners - middle) / size).cast((starts - middle) / size, ways)
     met = np.flatnonzero(triangle >= 0)
     a = corners[triangle[met], 0]
@@ -235,10 +235,10 @@ def _cast(corners: Floats, points: Floats, ways: Floats, size: float) -> tuple[F
     normal = np.cross(b - a, c - a)
     along = (normal * ways[met]).sum(axis=1)
     distance = np.full(len(points), np.inf)
-    out = np.zeros(len(points), np.bool_)
+    starts_inside = np.zeros(len(points), np.bool_)
     with np.errstate(divide="ignore", invalid="ignore"):
         exact = ((a - points[met]) * normal).sum(axis=1) / along
     distance[met] = np.where(np.isfinite(exact), np.maximum(exact, 0.0), near[met] * size)
-    out[met] = along > 0  # the ray meets the far side first
-    distance[out] = 0.0
-    return distance, out
+    starts_inside[met] = along > 0  # the ray meets the far side first
+    distance[starts_inside] = 0.0
+    return distance, starts_inside

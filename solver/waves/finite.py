@@ -18,8 +18,8 @@ _MAX_SUBSTEPS = 1_000_000
 _ONE_OR_MORE = whole(1)
 
 # Substeps between two checks of all heights. A check takes a fifth of a substep, so that the checks
-# take less than a hundredth of the time. Whoever reads the heights in between checks them as well.
-EVERY = 32
+# take less than a hundredth of the time. Reading the heights in between checks them as well.
+CHECK_INTERVAL = 32
 
 _MAX_FLOAT32 = float(np.finfo(np.float32).max)
 
@@ -53,15 +53,15 @@ def require_finite(name: str, value: float, unit: str, least: float = -np.inf) -
         raise SolverError(f"{name} must be a finite number{bound}, got {shown(value)} {unit}")
 
 
-def count_substeps(dt: float, stable: float, asked: int | None) -> int:
+def count_substeps(dt: float, stable: float, requested: int | None) -> int:
     """Number of equal substeps for a step of dt [s], at most `stable` [s] long each.
 
     Parameters
     ----------
     dt, stable : float
         [s].
-    asked : int or None
-        How many the caller wants; None: the fewest.
+    requested : int or None
+        The number that the caller wants; None: the fewest.
 
     Raises
     ------
@@ -75,21 +75,20 @@ def count_substeps(dt: float, stable: float, asked: int | None) -> int:
             f"take {ratio:.3g} substeps of the stable {stable:.4g} s: take shorter steps, or a "
             "material with slower waves"
         )
-    needed = max(1, int(np.ceil(ratio)))
-    if asked is None:
-        return needed
-    if not (_ONE_OR_MORE.holds(asked) and asked <= _MAX_SUBSTEPS):
+    fewest = max(1, int(np.ceil(ratio)))
+    if requested is None:
+        return fewest
+    if not (_ONE_OR_MORE.holds(requested) and requested <= _MAX_SUBSTEPS):
         raise SolverError(
             f"substeps must be {_ONE_OR_MORE.words}, up to {_MAX_SUBSTEPS}, or None for the "
-            f"fewest, got {shown(asked)}"
+            f"fewest, got {shown(requested)}"
         )
-    if asked < needed:
+    if requested < fewest:
         raise SolverError(
-            f"{asked} substeps of {dt / max(asked, 1):.4g} s are longer than the stable "
-            f"{stable:.4g} s; "
-            f"use {needed} or more substeps, or leave the number out"
+            f"{requested} substeps of {dt / max(requested, 1):.4g} s are longer than the stable "
+            f"{stable:.4g} s; use {fewest} or more substeps, or leave the number out"
         )
-    return asked
+    return requested
 
 
 class FiniteGuard:
@@ -107,7 +106,7 @@ class FiniteGuard:
         self._fastest = -np.inf
         self._largest = ("", 0.0, "", 0.0)
         self._reported = False
-        self._unseen = 0
+        self._unchecked = 0
 
     def note(self, kind: str, value: float, unit: str, time: float, speed: float) -> None:
         """Remember a source if it is the largest so far.
@@ -121,10 +120,10 @@ class FiniteGuard:
 
     def due(self, substeps: int) -> bool:
         """Whether the next check is due, after a number of further substeps."""
-        self._unseen += substeps
-        if self._unseen < EVERY:
+        self._unchecked += substeps
+        if self._unchecked < CHECK_INTERVAL:
             return False
-        self._unseen = 0
+        self._unchecked = 0
         return True
 
     def check(self, field: NDArray[np.float32], name: str, time: float) -> None:

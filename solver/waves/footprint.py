@@ -6,6 +6,7 @@ Contacts need the footprints of several sources at every step: `weigh_each` make
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,14 +24,15 @@ from .finite import require_finite
 MIN_TEXELS = 2.0
 
 # Ratios of the distance along the surface to the straight distance. Up to the first ratio the
-# surface counts as flat; from the second on, only the distance along the surface counts. In
-# between, the two distances are blended, so that no texel jumps in or out.
+# surface counts as flat, and the straight distance counts. From the second ratio on, the distance
+# along the surface counts. In between, the two distances are blended, so that no texel jumps in or
+# out.
 _FLAT_RATIO = 1.05
 _BENT_RATIO = 1.5
 
-# A search along the surface goes as far as this share of the radius: a bit beyond, since distances
-# are blended.
-_SEARCHED_SHARE = 1.1
+# A search along the surface goes as far as this factor times the radius: a bit beyond the radius,
+# since distances are blended.
+_SEARCHED_RADII = 1.1
 
 # Texels for which `weigh_each` makes room at first, and the factor by which the room grows.
 _FIRST_ROOM = 4096
@@ -56,78 +58,103 @@ def weigh_each(
     radii : float64 [k]
         The radii used [m].
     """
-    begins = np.zeros(len(centers) + 1, np.int64)
-    used = np.empty(len(centers))
-    done = 0
-    texels = np.empty(_FIRST_ROOM, np.int64)
-    weights = np.empty(_FIRST_ROOM)
+    sources = Sources(centers, points, radii)
+    footprints = Footprints(
+        begins=np.zeros(len(centers) + 1, np.int64),
+        radii=np.empty(len(centers)),
+        texels=np.empty(_FIRST_ROOM, np.int64),
+        weights=np.empty(_FIRST_ROOM),
+    )
     scratch = distance_scratch(len(grid.areas))
-    while done < len(centers):
-        done = _weigh(grid, centers, points, radii, scratch, done, begins, used, texels, weights)
-        if done < len(centers):  # there was no room for the next footprint
-            texels = np.resize(texels, _ROOM_GROWTH * len(texels))
-            weights = np.resize(weights, _ROOM_GROWTH * len(weights))
-    return begins, texels[: begins[-1]], weights[: begins[-1]], used
+    finished = _weigh(grid, sources, scratch, 0, footprints)
+    while finished < len(centers):  # there was no room for the next footprint
+        footprints = footprints._replace(
+            texels=np.resize(footprints.texels, _ROOM_GROWTH * len(footprints.texels)),
+            weights=np.resize(footprints.weights, _ROOM_GROWTH * len(footprints.weights)),
+        )
+        finished = _weigh(grid, sources, scratch, finished, footprints)
+    begins = footprints.begins
+    end = begins[-1]
+    return begins, footprints.texels[:end], footprints.weights[:end], footprints.radii
+
+
+class Sources(NamedTuple):
+    """Sources on a surface, k of them."""
+
+    centers: Ints  # the texel nearest to each, [k]
+    points: Floats  # [k, 3] [m]
+    radii: Floats  # the radii that are asked for, [k] [m]
+
+
+class Footprints(NamedTuple):
+    """Room for the footprints of k sources; see `weigh_each`."""
+
+    begins: Ints  # [k + 1]
+    radii: Floats  # the radii used, [k] [m]
+    texels: Ints  # [m]
+    weights: Floats  # [m]
 
 
 @kernel
 def _weigh(
-    grid: TexelGrid,
-    centers: Ints,
-    points: Floats,
-    radii: Floats,
-    scratch: Scratch,
-    first: int,
-    begins: Ints,
-    used: Floats,
-    texels: Ints,
-    weights: Floats,
+    grid: TexelGrid, sources: Sources, scratch: Scratch, first: int, footprints: Footprints
 ) -> int:
     """Fill in the footprints from number `first` on.
 
     Returns the number of the first footprint for which there was no room.
     """
+    begins = footprints.begins
+    texels = footprints.texels
+    weights = footprints.weights
     distance = scratch.distance
-    touched = scratch.touched
-    for i in range(first, len(centers)):
-        center = centers[i]
-        point = points[i]
-        radius = used[i] = max(radii[i], MIN_TEXELS * _spacing(grid, center))
-        count = _nearby(grid, center, point, radius, distance, touched)
-        end = begins[i]
-        total = 0.0
-        near = touched
-        known = count
-        flat = count > 0
-        if not flat:
-            count = seeded(grid.halo, grid.positions, center, point, distance, touched)
-            count, known = march(
-                grid.halo, grid.positions, count, _SEARCHED_SHARE * radius, scratch
+    for i in range(first, len(sources.centers)):
+        center = sources.centers[i]
+        point = sources.points[i]
+        radius = max(sources.radii[i], MIN_TEXELS * _spacing(grid, center))
+        footprints.radii[i] = radius
+        reached_count = _nearby(grid, center, point, radius, distance, scratch.reached)
+        is_flat = reached_count > 0
+        if is_flat:
+            near = scratch.reached
+            near_count = reached_count
+        else:
+            seeds = seeded(grid.halo, grid.positions, center, point, distance, scratch.reached)
+            reached_count, near_count = march(
+                grid.halo, grid.positions, seeds, _SEARCHED_RADII * radius, scratch
             )
             near = scratch.order
-        if end + known > len(texels):
-            clean(scratch, count)
+        end = begins[i]
+        if end + near_count > len(texels):
+            clean(scratch, reached_count)
             return i
-        for k in range(known):
+        total = 0.0
+        for k in range(near_count):
             t = near[k]
             away = distance[t]
-            straight = 0.0 if flat else distance_to(grid.positions, t, point)
-            if straight > 0:
-                beyond_flat = (away / straight - _FLAT_RATIO) / (_BENT_RATIO - _FLAT_RATIO)
-                bend = min(max(beyond_flat, 0.0), 1.0)
-                bend = bend * bend * (3 - 2 * bend)
-                away = (1 - bend) * straight + bend * away
+            if not is_flat:
+                away = _blended(away, distance_to(grid.positions, t, point))
             weight = max(1 - (away / radius) ** 2, 0.0) ** 3
             if weight > 0:
                 texels[end] = t
                 weights[end] = weight
                 total += weight * grid.areas[t]
                 end += 1
-        clean(scratch, count)
+        clean(scratch, reached_count)
         for k in range(begins[i], end):
             weights[k] /= total
         begins[i + 1] = end
-    return len(centers)
+    return len(sources.centers)
+
+
+@kernel(no_cpython_wrapper=True)
+def _blended(along_surface: float, straight: float) -> float:
+    """Blend the distance along the surface with the straight one [m], by the ratio of the two."""
+    if not straight > 0:
+        return along_surface
+    beyond_flat = (along_surface / straight - _FLAT_RATIO) / (_BENT_RATIO - _FLAT_RATIO)
+    bend = min(max(beyond_flat, 0.0), 1.0)
+    bend = bend * bend * (3 - 2 * bend)  # without a kink at both ends
+    return (1 - bend) * straight + bend * along_surface
 
 
 @kernel(no_cpython_wrapper=True)
@@ -151,23 +178,24 @@ def _spacing(grid: TexelGrid, center: int) -> float:
 def _nearby(
     grid: TexelGrid, center: int, point: Floats, radius: float, distance: Floats, texels: Ints
 ) -> int:
-    """Touch the connected texels within a straight distance of a point, if they lie flat.
+    """Reach the connected texels within a straight distance of a point [m], if they lie flat.
 
-    Returns how many texels were touched: 0 if they do not lie flat. They lie flat if no normal is
-    farther than acos(1/1.05) from the normal in the middle. The surface is then a graph over the
-    tangent plane, and no path along it is longer than 1.05 times the straight distance.
+    Returns the number of `texels` [T] that were reached: 0 if they do not lie flat. They lie flat
+    if no normal is farther than acos(1/1.05) from the normal in the middle. The surface is then a
+    graph over the tangent plane, and no path along it is longer than 1.05 times the straight
+    distance.
     """
     halo = grid.halo
     positions = grid.positions
     normals = grid.normals
     n = halo.shape[1] - 2
     count = 1
-    done = 0
+    visited = 0
     texels[0] = center
     distance[center] = distance_to(positions, center, point)
-    while done < count:
-        t = texels[done]
-        done += 1
+    while visited < count:
+        t = texels[visited]
+        visited += 1
         if distance[t] > radius:
             continue
         cosine = 0.0

@@ -25,13 +25,13 @@ from ..texels.atlas import Atlas
 from ..texels.chart_page import ChartPage
 from ..texels.halo import fill_halo
 from ..texels.texel_mesh import TexelMesh
-from ..texels.thickness import LEAST, medial_radius
+from ..texels.thickness import MIN_MEDIAL_RADIUS, medial_radius
 from ..texels.topology import TexelTopology
 
 # Shares of the medial radius: heights up to the first share are drawn as they are, and no height is
 # drawn beyond the second share. The shaders have constants of the same names.
-FREE = 0.25
-MOST = 0.6
+FREE_SHARE = 0.25
+MAX_SHARE = 0.6
 
 # Largest height in medial radii that enters the hyperbolic tangent, which is 1 far below it:
 # float32 would overflow otherwise.
@@ -71,7 +71,9 @@ class DisplacementLimit:
 
     def __init__(self, atlas: Atlas) -> None:
         self._atlas = atlas
-        self._always_free = FREE * LEAST * float(np.ptp(atlas.mesh.V, axis=0).max())
+        self._always_free = (
+            FREE_SHARE * MIN_MEDIAL_RADIUS * float(np.ptp(atlas.mesh.V, axis=0).max())
+        )
 
     @functools.cached_property
     def radius(self) -> NDArray[np.float32]:
@@ -88,7 +90,11 @@ class DisplacementLimit:
         if not len(radius):
             return height
         drawn = height.copy()
-        drawn[high] = np.sign(height[high]) * radius * (FREE + (MOST - FREE) * np.tanh(beyond))
+        drawn[high] = (
+            np.sign(height[high])
+            * radius
+            * (FREE_SHARE + (MAX_SHARE - FREE_SHARE) * np.tanh(beyond))
+        )
         return drawn
 
     def rate(
@@ -114,8 +120,8 @@ class DisplacementLimit:
             nothing = np.empty(0, np.float32)
             return none_bent, nothing, nothing
         radii = size / self.radius
-        high = radii > FREE
-        argument = (np.minimum(radii[high], _MAX_RADII) - FREE) / (MOST - FREE)
+        high = radii > FREE_SHARE
+        argument = (np.minimum(radii[high], _MAX_RADII) - FREE_SHARE) / (MAX_SHARE - FREE_SHARE)
         return high, self.radius[high], argument
 
 
@@ -143,8 +149,8 @@ class HeightMapShaders:
             "GROUP": _GROUP,
             "N": n,
             "COLUMNS": ChartPage(charts, n).columns,
-            "FREE": FREE,
-            "MOST": MOST,
+            "FREE_SHARE": FREE_SHARE,
+            "MAX_SHARE": MAX_SHARE,
         }
         shader = functools.partial(gl.compute_shader, _SOLVER_PACKAGE, **defines)
         with gl as ctx:
@@ -168,8 +174,7 @@ class HeightMapShaders:
         if not np.isfinite(highest):
             raise SolverError(
                 "heights to be drawn are no longer finite; a source was too large for float32: "
-                "make it smaller and "
-                "`reset()` the waves"
+                "make it smaller and `reset()` the waves"
             )
         limit = self._limit
         limited = limit is not None and limit.may_bend(highest)
@@ -419,14 +424,14 @@ def _differentiate(weights: Floats32, h: Floats32, height_map: Floats32) -> None
         r = i % n + 1
         for c in range(1, n + 1):
             g = weights[i * n + c - 1]
-            here = h[f, r, c]
+            height = h[f, r, c]
             gx = gy = gz = np.float32(0)
             for k in range(8):
-                step = h[f, r + _AROUND[k][0], c + _AROUND[k][1]] - here
+                step = h[f, r + _AROUND[k][0], c + _AROUND[k][1]] - height
                 gx += g[k, 0] * step
                 gy += g[k, 1] * step
                 gz += g[k, 2] * step
             height_map[f, r, c, 0] = gx
             height_map[f, r, c, 1] = gy
             height_map[f, r, c, 2] = gz
-            height_map[f, r, c, 3] = here
+            height_map[f, r, c, 3] = height

@@ -128,8 +128,7 @@ class Motion:
         if V.shape != shape:
             raise SolverError(
                 f"vertices have shape {V.shape}; the mesh of this surface has {shape}: give all of "
-                f"its vertices, in "
-                "the order of `atlas.mesh.V`"
+                "its vertices, in the order of `atlas.mesh.V`"
             )
         if not np.isfinite(V).all():
             raise SolverError(
@@ -187,7 +186,10 @@ class MovedGradients:
 
 @kernel
 def _carry(rest: Floats, moved: Floats, height_map: Floats32) -> None:
-    """Replace gradients at rest by gradients with the same differences along moved tangents."""
+    """Replace gradients at rest by gradients with the same differences along moved tangents.
+
+    The tangents are those of rows and of columns, [C, n, n, 2, 3].
+    """
     charts, n = rest.shape[:2]
     for chart in range(charts):
         for r in range(n):

@@ -26,12 +26,12 @@ from ..texels.atlas import Atlas
 from .finite import require_finite
 from .footprint import weigh_each
 
-# Compliances below this share of the greatest one are round-off: two points on one texel press on
-# the same place.
-_ROUND_OFF = 1e-10
+# Eigenvalues of the compliance below this share of the greatest one are round-off: two points on
+# one texel press on the same place.
+_MIN_EIGENVALUE_SHARE = 1e-10
 
 # Columns of the compliance that are solved for together: more take memory, fewer take calls.
-_COLUMNS = 64
+_COLUMNS_TOGETHER = 64
 
 
 class Imprint(NamedTuple):
@@ -89,9 +89,9 @@ class Stamp:
         self._compliance: Floats | None = None
 
     def press(self, forces: ArrayLike) -> Imprint:
-        """The imprint of given forces [N], [k] or one for all points, positive inwards."""
+        """The imprint of forces [N], [k] or one for all points, positive inwards."""
         count = self._shares.shape[1]
-        forces = _one_each("forces", forces, count)
+        forces = _one_for_each_point("forces", forces, count)
         loads = self._shares @ forces
         height = self._surface.heights(loads).reshape(self._areas.shape)
         pressure = loads.reshape(self._areas.shape) / self._areas
@@ -105,12 +105,12 @@ class Stamp:
         pressed.
         """
         count = self._shares.shape[1]
-        depths = _one_each("depths", depths, count)
-        touched = np.flatnonzero(depths > 0)
+        depths = _one_for_each_point("depths", depths, count)
+        in_contact = np.flatnonzero(depths > 0)
         forces = np.zeros(count)
-        if len(touched):
-            compliance = self.compliance[np.ix_(touched, touched)]
-            forces[touched] = _contact_forces(compliance, depths[touched])
+        if len(in_contact):
+            compliance = self.compliance[np.ix_(in_contact, in_contact)]
+            forces[in_contact] = _contact_forces(compliance, depths[in_contact])
         return self.press(forces)
 
     @property
@@ -119,8 +119,8 @@ class Stamp:
         if self._compliance is None:
             count = self._shares.shape[1]
             compliance = np.empty((count, count))
-            for first in range(0, count, _COLUMNS):
-                columns = slice(first, first + _COLUMNS)
+            for first in range(0, count, _COLUMNS_TOGETHER):
+                columns = slice(first, first + _COLUMNS_TOGETHER)
                 heights = self._surface.heights(self._shares[:, columns].toarray())
                 compliance[:, columns] = -(self._shares.T @ heights)
             self._compliance = (compliance + compliance.T) / 2  # but for round-off it is symmetric
@@ -164,13 +164,15 @@ def _contact_forces(compliance: Floats, depths: Floats) -> Floats:
     They minimise p' G p / 2 - d' p, which is the least-squares problem of nonnegative p for any
     root of G.
     """
-    stiffness, modes = eigh(compliance)
-    known = stiffness > _ROUND_OFF * stiffness[-1]
-    root = np.sqrt(stiffness[known])
-    return nnls(root[:, None] * modes[:, known].T, (modes[:, known].T @ depths) / root)[0]
+    eigenvalues, vectors = eigh(compliance)
+    is_real = eigenvalues > _MIN_EIGENVALUE_SHARE * eigenvalues[-1]
+    root = np.sqrt(eigenvalues[is_real])
+    modes = vectors[:, is_real].T
+    forces, _ = nnls(root[:, None] * modes, (modes @ depths) / root)
+    return forces
 
 
-def _one_each(name: str, values: ArrayLike, count: int) -> Floats:
+def _one_for_each_point(name: str, values: ArrayLike, count: int) -> Floats:
     """Finite numbers, one for each point."""
     array = np.asarray(values, dtype=np.float64)
     if array.shape not in ((), (count,)) or not np.isfinite(array).all():

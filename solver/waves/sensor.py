@@ -37,6 +37,9 @@ _PASSED_SHARE = 0.34
 
 _BLOCK_SAMPLES = 4096  # samples that are computed together: their weights take some MB
 
+# A texel and the four beside it.
+_TEXELS_IN_CROSS = 5
+
 # Singular values of a fit below this share of the largest one count as 0.
 _FIT_CUTOFF = 1e-6
 
@@ -207,7 +210,8 @@ class Sensor:
 
     def begin(self, time: float, values: NDArray) -> None:
         """Restart at a time [s], with the sums of the probes at that time."""
-        self._start = self._latest = time
+        self._start = time
+        self._latest = time
         self._next = 0
         self._last = np.asarray(values, np.float64)
         self._heard: list[tuple[float, float, NDArray]] = []
@@ -247,22 +251,7 @@ class Sensor:
         until = int(np.floor((self._latest - self.latency - self._start) * self.rate * (1 + 1e-12)))
         if until < self._next:
             return
-        # of the sums that were heard: times, spans and values
-        spans = np.concatenate([np.full(len(sums), dt) for _, dt, sums in self._heard])
-        times = np.concatenate(
-            [time + dt * np.arange(1, len(sums) + 1) for time, dt, sums in self._heard]
-        )
-        values = np.concatenate([sums for *_, sums in self._heard]).astype(np.float64)
-        self._heard.clear()
-        last = self._last
-        self._last = values[-1]
-        if self.kind == "acceleration":  # accelerations lie between two substeps
-            times = times - spans / 2
-            values = np.diff(values, axis=0, prepend=last[None]) / spans[:, None]
-        elif self._next == 0:
-            times = np.append(self._start, times)
-            spans = np.append(spans[:1], spans)
-            values = np.concatenate([last[None], values])
+        times, spans, values = self._take_heard()
         kept_times, kept_spans, kept_values = self._kept
         times = np.concatenate([kept_times, times])
         spans = np.concatenate([kept_spans, spans])
@@ -278,6 +267,28 @@ class Sensor:
         first_kept = np.searchsorted(times, next_time - self.latency)
         self._kept = times[first_kept:], spans[first_kept:], values[first_kept:]
 
+    def _take_heard(self) -> tuple[NDArray, NDArray, NDArray]:
+        """Times [m] [s], spans [m] [s] and values [m, points] since the last call.
+
+        Values are the sums that were heard, or their rates if accelerations are measured.
+        """
+        spans = np.concatenate([np.full(len(sums), dt) for _, dt, sums in self._heard])
+        times = np.concatenate(
+            [time + dt * np.arange(1, len(sums) + 1) for time, dt, sums in self._heard]
+        )
+        values = np.concatenate([sums for *_, sums in self._heard]).astype(np.float64)
+        self._heard.clear()
+        last = self._last
+        self._last = values[-1]
+        if self.kind == "acceleration":  # accelerations lie between two substeps
+            times = times - spans / 2
+            values = np.diff(values, axis=0, prepend=last[None]) / spans[:, None]
+        elif self._next == 0:
+            times = np.append(self._start, times)
+            spans = np.append(spans[:1], spans)
+            values = np.concatenate([last[None], values])
+        return times, spans, values
+
 
 def filtered(
     times: NDArray, spans: NDArray, values: NDArray, at: NDArray, rate: float
@@ -292,15 +303,18 @@ def filtered(
     first = np.searchsorted(times, at - reach)
     last = np.searchsorted(times, at + reach)
     places = first[:, None] + np.arange((last - first).max())
-    inside = places < last[:, None]
+    is_within_reach = places < last[:, None]
     places = np.minimum(places, len(times) - 1)
-    ages = np.minimum(
+    # how far each value is from the middle of the filter, in steps of its table
+    steps = np.minimum(
         np.abs(times[places] - at[:, None]) * (rate * _TABULATED), _FILTER_REACH * _TABULATED
     )
-    whole = ages.astype(np.int64)
+    index = steps.astype(np.int64)
     taps, slopes = _filter()
-    weights = (taps[whole] + slopes[whole] * (ages - whole)) * spans[places] * inside
-    return np.einsum("kw,kwp->kp", weights / weights.sum(axis=1, keepdims=True), values[places])
+    filter_values = taps[index] + slopes[index] * (steps - index)
+    weights = filter_values * spans[places] * is_within_reach
+    shares = weights / weights.sum(axis=1, keepdims=True)
+    return np.einsum("kw,kwp->kp", shares, values[places])
 
 
 @functools.cache
@@ -324,7 +338,8 @@ def _around(topology: TexelTopology, center: int, rings: int) -> NDArray[np.int6
     texels = np.array([center])
     for _ in range(rings):
         chart, row, column = np.unravel_index(texels, topology.shape)
-        rows, columns = (each[:, None] + np.arange(3) for each in (row, column))
+        rows = row[:, None] + np.arange(3)
+        columns = column[:, None] + np.arange(3)
         square = topology.halo[chart[:, None, None], rows[:, :, None], columns[:, None, :]]
         texels = np.unique(np.append(texels, square[square >= 0]))
     return texels
@@ -413,7 +428,8 @@ def _resolved(atlas: Atlas, material: Material, center: int) -> float:
     away = np.linalg.norm(
         atlas.positions.reshape(-1, 3)[texels] - atlas.positions.reshape(-1, 3)[center], axis=1
     )
-    widest = np.sort(away)[: min(5, len(away))].max()  # the four beside it
+    nearest = np.sort(away)[:_TEXELS_IN_CROSS]
+    widest = nearest.max()
     return hertz(material, center, _MIN_WAVE_TEXELS * widest)
 
 

@@ -189,10 +189,11 @@ class WaveSolver:
         substeps = count_substeps(dt, longest, substeps)
         begin = self.time
         self._substep = dt / substeps
-        for count, part in [(substeps, None)] if load is None else load.parts(dt, substeps):
+        loads = [(substeps, None)] if load is None else load.parts(dt, substeps)
+        for count, constant_load in loads:
             # values too large for float32 become infinite here; the next check reports them
             with np.errstate(over="ignore", invalid="ignore"):
-                force = self._held.upload(part)
+                force = self._held.upload(constant_load)
                 self._backend.advance(count, self._substep)
             if force is not None:
                 self._guard.note("forces", force, "N", begin, abs(force) * dt / self._least_mass)
@@ -206,7 +207,9 @@ class WaveSolver:
 
     def reset(self) -> None:
         """Flatten the surface, end all pressure, and set the time back to 0."""
-        self.height = self.velocity = self.pressure = 0.0
+        self.height = 0.0
+        self.velocity = 0.0
+        self.pressure = 0.0
         self.time = 0.0
         self.substeps_taken = 0
         self._guard.clear()
@@ -293,9 +296,8 @@ class WaveSolver:
     def conserve_volume(self) -> bool:
         """Whether the mean of sources is removed on any part of the surface.
 
-        It may be changed while the waves run.
-
-        Assign True or False for all parts, or None for the default of each.
+        Assign True or False for all parts, or None for the default of each, also while the waves
+        run.
         """
         return bool(self.kept_parts.any())
 

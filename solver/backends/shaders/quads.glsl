@@ -16,8 +16,8 @@ float hourglass(float pp, float qq, float pq, float area) {
     float a = 0.5 * (both_sides + abs(pq)), d = 0.25 * (pp - qq);
     float in_time = both_sides * area / (2.0 * (area * area + 3.0 * d * d));
     float unhurried = (a * a - d * d) / (4.0 * a * area);
-    float least = min(in_time, max(SHARE * unhurried, 2.0 * area / (PER_HOURGLASS * both_sides)));
-    return min(PER_TINY * (pp + qq), 1.0) * least;
+    float of_square = 2.0 * area / (PER_HOURGLASS * both_sides);
+    return min(PER_TINY * (pp + qq), 1.0) * min(in_time, max(MAX_HOURGLASS_SHARE * unhurried, of_square));
 }
 
 float quad_area(vec3 e, vec3 n, vec3 p) {
@@ -32,8 +32,8 @@ void quad(vec3 e, vec3 n, vec3 p, float detours[6], out float links[6]) {
     float to_south = detours[0] * dot(e, e), to_north = detours[1] * dot(north, north);
     float to_west = detours[2] * dot(n, n), to_east = detours[3] * dot(east, east);
     float to_pp = detours[4] * pp, to_qq = detours[5] * qq, to_pq = 0.5 * (to_west + to_east - to_south - to_north);
-    float most = (pp + to_pp) * (qq + to_qq), both = pq + to_pq;
-    float fit = clamp((most - both * both) / (FADED * max(most, TINY)), 0.0, 1.0);
+    float limit = (pp + to_pp) * (qq + to_qq), new_pq = pq + to_pq;
+    float fit = clamp((limit - new_pq * new_pq) / (DETOUR_FADE * max(limit, TINY)), 0.0, 1.0);
     to_pp *= fit;
     to_qq *= fit;
     to_pq *= fit;
@@ -43,10 +43,10 @@ void quad(vec3 e, vec3 n, vec3 p, float detours[6], out float links[6]) {
     pq += to_pq;
     float along_p = dot(way, p) + 0.5 * fit * (to_east + to_north - to_south - to_west);
     float along_q = dot(way, q) + 0.5 * fit * (to_east + to_south - to_north - to_west);
-    float twice = max(2.0 * max(sqrt(square), 0.5 * LEAST_AREA * (pp + qq)), TINY);
+    float twice = max(2.0 * max(sqrt(square), 0.5 * MIN_AREA * (pp + qq)), TINY);
     square = 0.25 * twice * twice;
     float a = (along_p * qq - along_q * pq) / square, b = (along_q * pp - along_p * pq) / square;
-    float uneven = EVEN * (a * a + b * b), share = uneven / (uneven + 1.0);
+    float uneven = EVENNESS * (a * a + b * b), share = uneven / (uneven + 1.0);
     a = clamp(share * a, -1.0, 1.0);
     b = clamp(share * b, -1.0, 1.0);
     float skew = pq / twice, h = hourglass(pp, qq, pq, 0.25 * twice);
@@ -73,7 +73,7 @@ void main() {
             detours[i], detours[i + width], detours[count + i], detours[count + i + 1], detours[rising], detours[falling]
         );
         quad(e, n, p, longer, links);
-        float ratio = max(quad_area(e, n, p) * per_area[i], LEAST_RATIO);
+        float ratio = max(quad_area(e, n, p) * per_area[i], MIN_AREA_RATIO);
         factor = power == -1.0 ? conductance[i] / ratio : conductance[i] * pow(ratio, power);
     }
     for (int k = 0; k < 6; k++) sides[k * count + i] = factor * links[k];

@@ -17,8 +17,9 @@ float height_at(int place) {
     if (texel < 0) return 0.0;
     float height = heights[texel];
 #ifdef LIMIT
-    float share = min(abs(height) / radii[texel], 1e3), beyond = (share - FREE) / (MOST - FREE);
-    if (share > FREE) height = sign(height) * radii[texel] * (FREE + (MOST - FREE) * tanh(beyond));
+    const float RANGE = MAX_SHARE - FREE_SHARE;
+    float share = min(abs(height) / radii[texel], 1e3), beyond = (share - FREE_SHARE) / RANGE;
+    if (share > FREE_SHARE) height = sign(height) * radii[texel] * (FREE_SHARE + RANGE * tanh(beyond));
 #endif
     return height;
 }

@@ -17,7 +17,7 @@ from ripple_sim.solver import (
     sphere_atlas,
     thickness_map,
 )
-from ripple_sim.solver.texels import LEAST, half_thickness, medial_radius
+from ripple_sim.solver.texels import MIN_MEDIAL_RADIUS, half_thickness, medial_radius
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
@@ -134,10 +134,10 @@ def test_points_moved_by_less_stay_nearest_to_where_they_came_from(animal: Atlas
     points = animal.positions.reshape(-1, 3)
     normals = animal.normals.reshape(-1, 3)
     radius = medial_radius(animal).reshape(-1)
-    assert radius.min() >= LEAST * size * (1 - 1e-12)
+    assert radius.min() >= MIN_MEDIAL_RADIUS * size * (1 - 1e-12)
     tree = cKDTree(points)
     for side in (-1.0, 1.0):
         moved = points + side * 0.6 * radius[:, None] * normals
         _, nearest = tree.query(moved)
         # but for details smaller than those that count
-        assert np.linalg.norm(points[nearest] - points, axis=1).max() < 3 * LEAST * size
+        assert np.linalg.norm(points[nearest] - points, axis=1).max() < 3 * MIN_MEDIAL_RADIUS * size

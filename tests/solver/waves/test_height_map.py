@@ -11,7 +11,7 @@ from ripple_sim.solver import HeightMap, Material, SolverError, WaveSolver, sphe
 from ripple_sim.solver.backends import DeviceField
 from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.texels import ChartPage
-from ripple_sim.solver.waves import FREE, MOST, DisplacementLimit
+from ripple_sim.solver.waves import FREE_SHARE, MAX_SHARE, DisplacementLimit
 
 
 def test_gradient_converges_at_second_order_also_at_the_cubes_edges() -> None:
@@ -181,7 +181,7 @@ def drawn(height: float) -> float:
 def test_heights_up_to_a_quarter_of_the_radius_are_drawn_as_they_are() -> None:
     height = np.random.default_rng(0).uniform(-0.49, 0.49, SHAPE).astype(np.float32)
     assert DisplacementLimit(ATLAS)(height) is height
-    assert FREE * 2.0 == 0.5
+    assert FREE_SHARE * 2.0 == 0.5
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -190,7 +190,7 @@ def test_the_drawn_height_grows_smoothly_towards_the_limit(sign: int) -> None:
     heights = np.linspace(0.3, 8.0, 800)
     seen = np.array([sign * limit(np.full(SHAPE, sign * h, np.float32))[0, 6, 6] for h in heights])
     assert (np.diff(seen)[:300] > 0).all() and (np.diff(seen) >= 0).all()
-    assert seen.max() <= MOST * 2.0 * (1 + 1e-3)
+    assert seen.max() <= MAX_SHARE * 2.0 * (1 + 1e-3)
     # slope and curvature have no jump where the bend begins
     slope = np.gradient(seen, heights)
     assert slope.max() <= 1.001
@@ -199,7 +199,7 @@ def test_the_drawn_height_grows_smoothly_towards_the_limit(sign: int) -> None:
 
 @pytest.mark.parametrize("height", [1e6, -1e30, np.finfo(np.float32).max])
 def test_no_height_is_too_large(height: float) -> None:
-    assert abs(drawn(height)) == pytest.approx(MOST * 2.0, rel=1e-3)
+    assert abs(drawn(height)) == pytest.approx(MAX_SHARE * 2.0, rel=1e-3)
     assert np.sign(drawn(height)) == np.sign(height)
 
 
