@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -134,7 +135,7 @@ def _draw_histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.
     area_in_bin, _ = np.histogram(stretch.clip(bins[0], bins[-1]), bins, weights=areas)
     heights = area_in_bin / area_in_bin.max()
     middles = np.sqrt(bins[1:] * bins[:-1])
-    bars = {
+    bars: dict[str, Any] = {
         "width": np.diff(bins),
         "align": "edge",
         "color": STRETCH_COLORS(stretch_shade(middles)),
