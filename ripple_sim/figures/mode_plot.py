@@ -123,8 +123,10 @@ def plot_modes(
     """
     check_plot_path(path)
     figure = dressed(title, subtitle)
-    images = _pictures(atlas, found, _view(atlas, up), _max_picture_size(figure, len(found.shapes)))
-    places = _picture_places(figure, images.shape[1] / images.shape[2], len(images))
+    images = _mode_images(
+        atlas, found, _view(atlas, up), _max_image_size(figure, len(found.shapes))
+    )
+    places = _image_places(figure, images.shape[1] / images.shape[2], len(images))
     for k, (image, place) in enumerate(zip(images, places, strict=True)):
         show(figure, place, image)
         left, bottom, width, _ = place
@@ -148,7 +150,7 @@ def _view(atlas: Atlas, up: str) -> View:
     return View(up=up)
 
 
-def _max_picture_size(figure: Figure, count: int) -> int:
+def _max_image_size(figure: Figure, count: int) -> int:
     """Size at which to draw each of `count` pictures [pixels]."""
     area = _place_width(figure) * _place_height(figure)
     return round(min(_MAX_PICTURE_SIZE, _PICTURE_SIZE * np.sqrt(area / count)))
@@ -164,7 +166,7 @@ def _place_height(figure: Figure) -> float:
     return _PLACE[3] * figure.get_figheight() * figure.dpi
 
 
-def _pictures(atlas: Atlas, found: Modes, view: View, size: int) -> NDArray[np.float64]:
+def _mode_images(atlas: Atlas, found: Modes, view: View, size: int) -> NDArray[np.float64]:
     """RGBA images of all modes, [k, height, width, 4], without the margin that all have."""
     painter = ModePainter(atlas)
     images = np.stack([painter.mode(shape, view, size) for shape in found.shapes])
@@ -174,7 +176,7 @@ def _pictures(atlas: Atlas, found: Modes, view: View, size: int) -> NDArray[np.f
     return images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
-def _picture_places(
+def _image_places(
     figure: Figure, aspect: float, count: int
 ) -> list[tuple[float, float, float, float]]:
     """Left, bottom, width and height of `count` pictures, as shares of the figure.

@@ -134,8 +134,8 @@ def kick_drift(
         extra = row_of(kick.extra, at, pitch)
         acceleration = row_of(kick.acceleration, first, columns)
         for c in range(1, columns + 1):
-            pressed = value_in(span, c - 1) * value_in(acceleration, c - 1)
-            small = pressed - value_in(spring, c - 1) * row[c]
+            load_kick = value_in(span, c - 1) * value_in(acceleration, c - 1)
+            small = load_kick - value_in(spring, c - 1) * row[c]
             force = force_at(
                 below, row, above, east, north, south, rising, risen, falling, fallen, c
             )
