@@ -26,7 +26,7 @@ from .paint import paint_target
 from .scene import Scene
 from .scene_file import Color, RippleEntry
 from .source import scene_path, shipped_scenes
-from .standing import SIZE, UP_AXES, stand, usual_up
+from .standing import SIZE, UP_AXES, stand, states_front, states_up, usual_up
 
 # Duration of the scene [s].
 DURATION = 5.0
@@ -89,8 +89,9 @@ def drop_scene(
         Seed of their sizes, places and colours.
     up : str, optional
         Axis of the file that points up, "y" or "z". By default a sheet lies down: an open mesh in
-        one part that is thinner than a third of its longest extent. For other meshes see
-        `usual_up`, unless the mesh would fall over on that axis, and stands on the other.
+        one part that is thinner than a third of its longest extent. Files of glTF, FBX and COLLADA
+        state their up axis. For other meshes see `usual_up`, unless the mesh would fall over on
+        that axis, and stands on the other.
     look : str
         Look of the target, one of `LOOKS`.
     color : (float, float, float), optional
@@ -124,8 +125,9 @@ def drop_scene(
         raise SceneError(f"the up axis must be {' or '.join(map(repr, UP_AXES))}, got {up!r}")
     mesh = load_mesh(mesh_path, **reading)
     body_shapes = _body_shapes(shapes, mesh.closed)
-    V, note = stand(mesh, up, usual_up(mesh_path))
-    camera, eye = drop_camera(V, mesh.F, mesh.closed, DURATION, view, elevation)
+    V, note = stand(mesh, up, usual_up(mesh_path), states_up(mesh_path))
+    has_front = states_front(mesh_path) and up != "z"
+    camera, eye = drop_camera(V, mesh.F, mesh.closed, DURATION, view, elevation, has_front)
     extent = Extent.of(mesh)
     slenderness = _slenderness(mesh, extent)
     scale = float(np.clip(slenderness / _SLENDER_RADIUS, _MIN_BODY_SCALE, 1.0))

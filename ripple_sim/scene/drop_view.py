@@ -116,6 +116,7 @@ def drop_camera(
     duration: float,
     view: str | float | None = None,
     elevation: float | None = None,
+    has_front: bool = False,
 ) -> tuple[CameraEntry, NDArray[np.float64]]:
     """Camera of a target that fills the frame, and its eye half-way of the orbit [m].
 
@@ -132,6 +133,8 @@ def drop_camera(
         view with the best `_score`.
     elevation : float, optional
         [degrees]; negative looks down. By default from -50 for a flat target to -26 for a high one.
+    has_front : bool
+        Whether the front, which faces -y, is known: then it is seen by default.
 
     Raises
     ------
@@ -148,7 +151,7 @@ def drop_camera(
             f"{shown(elevation)}"
         )
     if azimuth is None:
-        azimuth = _best_azimuth(V, F, closed, elevation)
+        azimuth = _best_azimuth(V, F, closed, elevation, has_front)
     lookat, distance, eye = _fitted(V, azimuth, elevation)
     orbit = 0.0 if from_top else _ORBIT
     x, y, z = lookat.tolist()
@@ -177,7 +180,11 @@ def _azimuth(view: str | float | None) -> float | None:
 
 
 def _best_azimuth(
-    V: NDArray[np.float64], F: NDArray[np.int64], closed: bool, elevation: float
+    V: NDArray[np.float64],
+    F: NDArray[np.int64],
+    closed: bool,
+    elevation: float,
+    has_front: bool,
 ) -> float:
     """Azimuth of the view that shows most of a target [degrees]."""
     subject = _subject(V, F, closed)
@@ -185,6 +192,8 @@ def _best_azimuth(
     for azimuth in _STRAIGHT_AZIMUTHS:
         scores[azimuth] = _score(subject, V, azimuth, elevation) - _STRAIGHT_COST
     candidates = list(scores)
+    if has_front:
+        candidates = [azimuth for azimuth in scores if np.sin(np.radians(azimuth)) > 0]
     if _uprightness(V) < _LYING_HEIGHT:
         candidates = [
             azimuth for azimuth in scores if abs(azimuth - VIEWS["front"]) <= _MAX_SIDEWAYS

@@ -13,6 +13,13 @@ from ripple_sim.solver import Mesh
 # Axes of a file that may point up.
 UP_AXES = ("y", "z")
 
+# Endings of formats that state which axis points up: in glTF 2.0 (section 3.4) it is y, and assimp
+# turns FBX and COLLADA files so that y points up.
+_Y_UP_ENDINGS = (".glb", ".gltf", ".fbx", ".dae")
+
+# Endings of formats in which models face +z (glTF 2.0, section 3.4).
+_FRONT_ENDINGS = (".glb", ".gltf")
+
 # The target's longest edge of its bounding box [m].
 SIZE = 1.0
 
@@ -61,7 +68,17 @@ def usual_up(path: str | Path) -> str:
     return "z" if Path(path).suffix.lower() == ".stl" else "y"
 
 
-def stand(mesh: Mesh, up: str | None, usual: str) -> Standing:
+def states_up(path: str | Path) -> bool:
+    """Whether files of this format state that the usual axis points up."""
+    return Path(path).suffix.lower() in _Y_UP_ENDINGS
+
+
+def states_front(path: str | Path) -> bool:
+    """Whether models in files of this format face +z, where y points up."""
+    return Path(path).suffix.lower() in _FRONT_ENDINGS
+
+
+def stand(mesh: Mesh, up: str | None, usual: str, stated: bool = False) -> Standing:
     """Scale a mesh to the size, and stand it on the floor.
 
     Parameters
@@ -72,6 +89,8 @@ def stand(mesh: Mesh, up: str | None, usual: str) -> Standing:
         the mesh falls over on that one and stands on the other.
     usual : str
         Axis that usually points up in such files.
+    stated : bool
+        Whether the file states that this axis points up: then the mesh stands on no other.
     """
     if up is not None:
         return Standing(_upright(mesh, up))
@@ -79,6 +98,8 @@ def stand(mesh: Mesh, up: str | None, usual: str) -> Standing:
     if thin is not None:
         note = f'it is a thin sheet and lies down; --up {usual}, in Python up="{usual}", stands it'
         return Standing(_upright(mesh, thin), "" if thin == usual else note)
+    if stated:
+        return Standing(_upright(mesh, usual))
     standing = {axis: _upright(mesh, axis) for axis in UP_AXES}
     falls = {axis: _falls(V, mesh.F) for axis, V in standing.items()}
     # an axis on which the mesh stands, and of two such axes the usual one

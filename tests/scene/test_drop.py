@@ -205,6 +205,25 @@ def test_the_camera_sees_a_round_head_even_at_the_back(tmp_path) -> None:
     assert np.sin(np.radians(middle_azimuth(scene))) < 0
 
 
+def test_gltf_files_state_their_up_axis_and_their_front(tmp_path) -> None:
+    """A flag on a pole falls over on y, and the head of an animal is at its back."""
+    pole = trimesh.creation.box((0.2, 1, 0.2))
+    flag = trimesh.creation.box((1, 0.2, 0.2)).apply_translation([0.5, 0.5, 0])
+    heights = []
+    for name in ("flag.obj", "flag.glb"):
+        trimesh.util.concatenate([pole, flag]).export(tmp_path / name)
+        heights.append(np.ptp(vertices(drop_scene(tmp_path / name, bodies=0))[:, 2]))
+    assert heights[0] < 0.2 and heights[1] > 0.9
+    trunk = trimesh.creation.icosphere(2, 0.25).apply_scale([1, 1.6, 0.8])
+    head = trimesh.creation.icosphere(2, 0.13).apply_translation([0, 0.45, -0.3])
+    animal = trimesh.util.concatenate([trunk, head])
+    fronts = []
+    for name in ("animal.obj", "animal.glb"):
+        animal.export(tmp_path / name)
+        fronts.append(np.sin(np.radians(middle_azimuth(drop_scene(tmp_path / name, bodies=0)))) > 0)
+    assert fronts == [False, True]
+
+
 def test_view_elevation_color_and_shapes_are_used(tmp_path) -> None:
     path = cone(tmp_path, "a.stl")
     for view, azimuth in (("front", 90), ("left", 0), ("back", 270), ("right", 180), (33, 33)):
