@@ -4,8 +4,8 @@ Two elastic bodies press each other with a force that grows as the power 3/2 of 
 (Hertz 1882; Johnson, Contact Mechanics, 1985, sections 4.2 and 11.4). A ball that hits leaves after
 microseconds to milliseconds, where MuJoCo's contact holds it for tens of milliseconds. When a hit
 begins, its impulse is foreseen from MuJoCo's own contact law, and given over Hertz's time. The
-surface then has the impulse of MuJoCo's contact in advance; what the contact gives beyond the
-foreseen impulse follows when it comes, so that nothing is lost.
+surface then has the impulse of MuJoCo's contact in advance. If the contact gives more than the
+foreseen impulse, the rest follows when it comes, so that nothing is lost.
 """
 
 from __future__ import annotations
@@ -85,13 +85,17 @@ def hertz_moduli(model: mujoco.MjModel, targets: Mapping[str, Target]) -> dict[T
 def given_share(age: float) -> float:
     """Share of a Hertz pulse's impulse that is given when a share `age` of its time has passed.
 
-    With x the approach over the greatest one, x' = sqrt(1 - x^(5/2)) in its own time: time is an
-    incomplete beta function of x^(5/2), and the impulse is (1 - x') / 2 while they approach.
+    Let x be the approach over its greatest value. The speed of approach, over the speed of the hit,
+    is sqrt(1 - x^(5/2)). So the time is an incomplete beta function of x^(5/2) with the parameters
+    2/5 and 1/2. While the bodies approach, the share of the impulse is (1 - speed) / 2; they part
+    as they have approached.
     """
     if age >= _OVER:
         return 1.0
-    early = min(age, 1 - age)
-    share = (1 - math.sqrt(1 - float(betaincinv(0.4, 0.5, 2 * early)))) / 2
+    age_while_approaching = min(age, 1 - age)
+    x_to_five_halves = float(betaincinv(0.4, 0.5, 2 * age_while_approaching))
+    speed = math.sqrt(1 - x_to_five_halves)
+    share = (1 - speed) / 2
     return share if age < 0.5 else 1 - share
 
 

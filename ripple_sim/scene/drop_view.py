@@ -219,6 +219,7 @@ def _subject(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> _Sub
     upward = normals[:, 2] if closed else np.abs(normals[:, 2])
     up = np.zeros_like(points)
     up[:, 2] = SIZE
+    # the numbers of the box along the three axes, -2 to 2, as digits in base 5
     bins = np.rint(1.5 * normals).astype(int) @ [25, 5, 1] + 62
     # rays begin a little above the surface, and go beyond the top of the target
     is_open_above = scene.distances(points + 1e-3 * up, 3 * up) > 1
