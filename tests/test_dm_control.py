@@ -71,23 +71,22 @@ def test_render_draws_dm_controls_picture_with_the_ripples(make: Any) -> None:
     assert {tuple(each) for each in segmentation.reshape(-1, 2)} == {(-1, -1), (0, 5), (1, 5)}
     ripples["block"].velocity = np.random.default_rng(2).standard_normal((6, 16, 16)) / 10
     ripples["block"].step(0.02)
-    assert np.abs(physics.render(**size).astype(int) - plain).mean() > 0.5
-    moved = np.abs(physics.render(**size, depth=True) - depth)[segmentation[..., 0] == 0]
-    assert 1e-4 < np.median(moved) < 0.05
+    assert np.abs(physics.render(**size).astype(int) - plain).mean() > 0.5  # codes of 255
+    on_block = segmentation[..., 0] == 0
+    change_of_depth = np.abs(physics.render(**size, depth=True) - depth)[on_block]
+    assert 1e-4 < np.median(change_of_depth) < 0.05  # [m]
     option = mujoco.MjvOption()
     option.geomgroup[:] = 0
     assert (physics.render(**size, segmentation=True, scene_option=option) == -1).all()
 
     def added(_: Any, scene: mujoco.MjvScene) -> None:
-        ball = mujoco.mjtGeom.mjGEOM_SPHERE
-        size = np.full(3, 0.2)
         mujoco.mjv_initGeom(
             scene.geoms[scene.ngeom],
-            ball,
-            size,
-            np.zeros(3),
-            np.eye(3).ravel(),
-            [1.0, 0.0, 0.0, 1.0],
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=np.full(3, 0.2),
+            pos=np.zeros(3),
+            mat=np.eye(3).ravel(),
+            rgba=[1.0, 0.0, 0.0, 1.0],
         )
         scene.ngeom += 1
 

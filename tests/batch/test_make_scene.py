@@ -123,7 +123,7 @@ def test_frames_and_passes_are_read_from_a_tar_file(packed):
         scene.read("clip.mp4")
 
 
-def test_a_tar_file_has_the_same_bytes_packed_in_any_steps(packed, tmp_path):
+def test_a_tar_file_has_the_same_bytes_if_its_scenes_are_packed_one_by_one(packed, tmp_path):
     batch = new_batch(tmp_path, PACKED)
     for numbers in ((1,), (0, 2)):  # as after --retry-failed
         for number in numbers:
@@ -134,11 +134,10 @@ def test_a_tar_file_has_the_same_bytes_packed_in_any_steps(packed, tmp_path):
     assert make_scene(str(batch.path), 1).state == "there"
     with tarfile.open(batch.tar(0)) as file:
         names = file.getnames()
-    samples = [name.split(".")[0] for name in names]
-    assert samples == sorted(samples)
-    assert {"000001.video.mp4", "000001.scene.json", "000001.video.passes.passes_00002.npz"} <= set(
-        names
-    )
+    scenes = [name.split(".")[0] for name in names]
+    assert scenes == sorted(scenes)
+    of_one_scene = {"scene.json", "video.mp4", "video.passes.passes_00002.npz"}
+    assert {f"000001.{name}" for name in of_one_scene} <= set(names)
 
 
 def test_no_scene_is_stored_twice_after_a_kill_during_packing(packed, tmp_path, monkeypatch):

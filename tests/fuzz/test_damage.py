@@ -5,7 +5,7 @@ import dataclasses
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -132,20 +132,28 @@ def test_a_damaged_batch_continues_or_is_refused(
 
 
 COMMON = ("--fps", 40, "--duration", 0.1, "--size", "32x32", "--backend", "cpu")
-JOBS: dict[str, tuple[Any, ...]] = {
-    "frames": ("render", "-o", "out/frames", "--passes", "depth,height"),
-    "mp4": ("render", "-o", "out/film.mp4", "--passes", "depth"),
-    "webp": ("render", "-o", "out/film.webp"),
-    "gif": ("render", "-o", "out/film.gif", "--passes", "height"),
-    "usda": ("export", "-o", "out/run.usda", "--chunk", 1),
-    "zarr": ("export", "-o", "out/run.zarr"),
-    "html": ("export", "-o", "out/run.html"),
-    "parquet": ("export", "-o", "out/run.parquet"),
+
+
+class Job(NamedTuple):
+    command: str
+    output: str
+    options: tuple[Any, ...] = ()
+    can_resume: bool = False
+
+    def words(self, *more: str) -> list[Any]:
+        return [self.command, "scene.toml", "-o", self.output, *self.options, *COMMON, *more]
+
+
+JOBS = {
+    "frames": Job("render", "out/frames", ("--passes", "depth,height"), can_resume=True),
+    "mp4": Job("render", "out/film.mp4", ("--passes", "depth"), can_resume=True),
+    "webp": Job("render", "out/film.webp", can_resume=True),
+    "gif": Job("render", "out/film.gif", ("--passes", "height"), can_resume=True),
+    "usda": Job("export", "out/run.usda", ("--chunk", 1), can_resume=True),
+    "zarr": Job("export", "out/run.zarr"),
+    "html": Job("export", "out/run.html"),
+    "parquet": Job("export", "out/run.parquet"),
 }
-
-
-def words(name: str, *more: str) -> list[Any]:
-    return [JOBS[name][0], "scene.toml", *JOBS[name][1:], *COMMON, *more]
 
 
 @pytest.fixture(scope="module")
@@ -157,14 +165,14 @@ def outputs(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         patch.chdir(home)
         for ending in (".mp4", ".gif"):
             patch.setitem(FORMATS, ending, dataclasses.replace(FORMATS[ending], length=2))
-        for name in JOBS:
-            assert command(*words(name)) == 0
+        for name, job in JOBS.items():
+            assert command(*job.words()) == 0
             (home / "out").rename(home / f"{name} whole")
             with pytest.MonkeyPatch.context() as interrupted:
                 interrupted.setattr(
                     render, "frame_progress", lambda *_: contextlib.nullcontext(interrupting_at(3))
                 )
-                assert cli.main([*map(str, words(name))]) == 130
+                assert cli.main([*map(str, job.words())]) == 130
             (home / "out").mkdir(exist_ok=True)
             (home / "out").rename(home / f"{name} half")
         yield home
@@ -180,16 +188,17 @@ def outputs(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 def test_damaged_outputs_are_replaced_or_refused(
     outputs: Path, name: str, state: str, damages: list, flag: str
 ):
-    # --overwrite replaces what a link leads to
+    # --overwrite replaces the file to which a link leads
     assume(not flag or all(kind != "link" for _, kind, _ in damages))
-    resumed = (
-        ["--resume"] if state == "half" and (JOBS[name][0] == "render" or name == "usda") else []
-    )
+    job = JOBS[name]
+    options = flag.split()
+    if state == "half" and job.can_resume:
+        options.append("--resume")
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
         patch.chdir(home)
         write_files(home)
         shutil.copytree(outputs / f"{name} {state}", home / "out")
         damage(home / "out", damages)
-        if command(*words(name, *resumed, *flag.split())) == 0:
-            assert (home / JOBS[name][2]).exists()
-            assert not [each for each in home.rglob("*") if each.name.endswith(".part")]
+        if command(*job.words(*options)) == 0:
+            assert (home / job.output).exists()
+            assert not list(home.rglob("*.part"))

@@ -69,7 +69,9 @@ def command(*words: object) -> int:
     assert status in (0, 1, 2)
     assert all(line.startswith("ripple-sim: ") and len(line) < 900 for line in lines), lines
     news = ("ripple-sim: warning: ", "ripple-sim: compiling ")
-    assert len([line for line in lines if not line.startswith(news)]) == (status > 0), lines
+    # a slow machine prints the progress of a long job
+    others = [line for line in lines if not line.startswith(news) and "% done, " not in line]
+    assert len(others) == (status > 0), lines
     return status
 
 

@@ -131,7 +131,7 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
     )
     assert len(lines) == 1 and re.match(said, lines[0]), result.stderr
     options = VideoOptions(resume=True, **OPTIONS, backend="cpu", duration=0.6)
-    # of those that were given for encoding, what waits is given up
+    # frames that still wait to be encoded are lost
     assert render_video(scene, tmp_path / "frames", options).resumed_at > 8
 
 

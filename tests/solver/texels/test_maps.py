@@ -35,16 +35,13 @@ def test_an_image_lands_where_its_coordinates_say(globe: Atlas, tmp_path: Path) 
     height = 128
     longitude = (np.arange(width) + 0.5) / width * 2 * np.pi
     latitude = (0.5 - (np.arange(height) + 0.5) / height) * np.pi
-    values = (
-        0.5
-        + 0.3 * np.sin(latitude)[:, None]
-        + 0.2 * np.cos(latitude)[:, None] ** 2 * np.cos(2 * longitude)
-    )
+    bands = 0.3 * np.sin(latitude)[:, None]
+    sectors = 0.2 * np.cos(latitude)[:, None] ** 2 * np.cos(2 * longitude)
+    values = 0.5 + bands + sectors
     path = tmp_path / "map.png"
     Image.fromarray(np.round(values * 65535).astype(np.uint16)).save(path)
-    x, y, z = np.moveaxis(
-        globe.positions / np.linalg.norm(globe.positions, axis=-1, keepdims=True), -1, 0
-    )
+    directions = globe.positions / np.linalg.norm(globe.positions, axis=-1, keepdims=True)
+    x, y, z = np.moveaxis(directions, -1, 0)
     expected = 0.5 + 0.3 * z + 0.2 * (x**2 - y**2)
     # coordinates are linear in each triangle, which is wrong next to the poles
     inside = np.abs(z) < 0.95
