@@ -131,6 +131,7 @@ class Drawing {
       mirrorMap: 7,
       shades: 8,
       glowImage: 9,
+      floorPlane: floor ? planeOf(floor.floorFrame) : [0, 0, 0, 0],
     };
     this.ready = new Set(); // programs that have these
     this.heated = heat;
@@ -330,4 +331,10 @@ class Drawing {
   cover() {
     this.gl.drawArrays(this.gl.TRIANGLES, 0, 3);
   }
+}
+
+// The plane of a frame's first two axes: its normal, and how high it lies along that.
+function planeOf(frame) {
+  const up = frame.slice(8, 11);
+  return [...up, dot(up, frame.slice(12, 15))];
 }

@@ -36,6 +36,7 @@ function lightOf(meta, view, boxes, shadowSize) {
     sky,
     around,
     bounce,
+    shadedBounce: floor ? albedo.map((x, i) => x * around[i]) : bounce,
     turn: right.slice(0, 2),
     lampWay: pad(ways),
     lampRadiance: pad(lamps.map(lamp => lamp.radiance)),

@@ -2,8 +2,8 @@
 // map and without its occlusion maps. Loops are written out: in software an array at an index that
 // changes takes longer than the sums. `near`: whether any of the lamps has a position.
 const lightShader = ({lamps, near}) => `
-// around: what lights the floor; bounce: what it sends back
-uniform vec3 eye, horizon, zenith, sky, around, bounce;
+// around: what lights the floor; bounce: what it sends back, and where it lies in shadow
+uniform vec3 eye, horizon, zenith, sky, around, bounce, shadedBounce;
 uniform vec2 turn;  // of the environment's maps
 uniform float casts, shadowTexel;
 uniform vec3 lampWay[4], lampRadiance[4], lampPosition[4], lampFalloff[4];
@@ -104,9 +104,18 @@ vec4 from(sampler2D map, vec3 d) {
   vec2 turned = vec2(dot(d.xy, turn), turn.x * d.y - turn.y * d.x);
   return texture(map, 0.5 + 0.5 * turned * inversesqrt(max(2.0 + 2.0 * d.z, 2e-6)));
 }
-vec3 mirrored(sampler2D map, vec3 d, float roughness) {
+uniform sampler2D shades;
+uniform vec4 floorPlane;  // its normal, and how high it lies along that
+// What the floor sends back along a ray that may meet it.
+vec3 bounceTo(vec3 point, vec3 d) {
+  float height = dot(floorPlane.xyz, point) - floorPlane.w, down = -dot(floorPlane.xyz, d);
+  vec3 c = inShadowMap(point + d * (max(height, 0.0) / max(down, 0.1)), vec3(0.0));
+  float lightness = down < 0.1 || outsideShadows(c) ? 1.0 : 1.0 - texture(shades, c.xy).x;
+  return mix(shadedBounce, bounce, lightness);
+}
+vec3 mirrored(sampler2D map, vec3 point, vec3 d, float roughness) {
   vec4 boxes = from(map, d);
-  return boxes.rgb + mix(bounce, 0.75 * skyAt(d, roughness), boxes.a);
+  return boxes.rgb + mix(bounceTo(point, d), 0.75 * skyAt(d, roughness), boxes.a);
 }
 vec3 lit(vec3 point, vec3 normal, vec3 albedo) {
   vec3 view = normalize(eye - point), n = normalize(normal);
@@ -123,10 +132,10 @@ ${lamps.map(reflectedOf).join("")}
   shade *= 1.0 - base.y;
   vec3 reflectance = f0 + (max(vec3(1.0 - rough), f0) - f0) * (edge3 * edge * edge);
   shade += (base.z * edge3 * ambience + volume.z) * albedo;
-  shade += mirrored(mirrorMap, mirror, rough) * reflectance + highlight;
+  shade += mirrored(mirrorMap, point, mirror, rough) * reflectance + highlight;
 #ifdef COAT
   float edge5 = edge3 * edge * edge, coat = base.w * (0.04 + 0.96 * edge5);
-  shade = mix(shade, mirrored(coatMap, mirror, 0.06), coat);
+  shade = mix(shade, mirrored(coatMap, point, mirror, 0.06), coat);
 #endif
   return shade;
 }
