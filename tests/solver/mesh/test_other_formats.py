@@ -80,3 +80,16 @@ def test_without_the_package_its_command_is_named(tmp_path: Path, monkeypatch) -
         (tmp_path / f"a{ending}").write_bytes(b"x")
         with pytest.raises(MeshError, match=r"need the package assimp-py: run pip install 'ripple"):
             load_mesh(tmp_path / f"a{ending}")
+
+
+def test_units_opacity_and_emission_are_those_of_the_file(tmp_path: Path) -> None:
+    extents = []
+    for unit in ("1", "0.01"):
+        (tmp_path / "a.dae").write_text(DAE.replace('meter="1"', f'meter="{unit}"'))
+        extents.append(np.ptp(load_mesh(tmp_path / "a.dae").V))
+    assert extents == pytest.approx([1, 0.01])
+    material = '<Material diffuseColor="0 0 1" emissiveColor="0 1 0" transparency="0.25"/>'
+    (tmp_path / "a.x3d").write_text(X3D.replace('<Material diffuseColor="0 0 1"/>', material))
+    (paint,) = load_mesh(tmp_path / "a.x3d").looks.paints
+    assert (paint.emission, paint.alpha) == ((0, 1, 0), "blend")
+    assert paint.color == pytest.approx((0, 0, 1, 0.75))
