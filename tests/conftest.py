@@ -73,6 +73,15 @@ def opengl() -> None:
 
 
 @pytest.fixture(scope="session")
+def computes(opengl: None) -> None:
+    """OpenGL 4.3, which has compute shaders; skipped with an older driver."""
+    from ripple_sim.solver.gl import shared_context
+
+    if not shared_context().computes:
+        pytest.skip("the driver has no compute shaders, which came with OpenGL 4.3")
+
+
+@pytest.fixture(scope="session")
 def animal() -> "Atlas":
     """Atlas of a mesh with limbs."""
     from ripple_sim.scenes.shapes import limbed

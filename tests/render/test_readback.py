@@ -167,7 +167,9 @@ def test_colours_are_divided_by_opacity(gl) -> None:
     np.testing.assert_array_equal(got[:, 3], opacity)
 
 
-@pytest.mark.parametrize("backend", ["cpu", "gl"])
+@pytest.mark.parametrize(
+    "backend", ["cpu", pytest.param("gl", marks=pytest.mark.usefixtures("computes"))]
+)
 @pytest.mark.parametrize(
     "options", [{"overlay": ["height", "contacts"], "compare": "paper"}, {"supersample": 2}]
 )

@@ -217,6 +217,7 @@ def sampled(resources, texture, places, kind="2D") -> np.ndarray:
         return np.frombuffer(got.read(), np.float32).reshape(-1, 4)[:, :3]
 
 
+@pytest.mark.usefixtures("computes")
 def test_every_byte_reads_as_linear_light(resources):
     pixels = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2)
     middles = [[(i + 0.5) / 256, 0.5, 0, 0] for i in range(256)]
@@ -224,6 +225,7 @@ def test_every_byte_reads_as_linear_light(resources):
     np.testing.assert_allclose(got, srgb_to_linear(pixels[0] / 255), atol=2e-3)
 
 
+@pytest.mark.usefixtures("computes")
 @pytest.mark.parametrize("size", [(1, 1), (2, 3), (5, 7)])
 def test_the_first_row_is_at_v_zero_and_the_picture_repeats(resources, size):
     """Also where rows are no multiple of four bytes."""
@@ -237,6 +239,7 @@ def test_the_first_row_is_at_v_zero_and_the_picture_repeats(resources, size):
         np.testing.assert_allclose(sampled(resources, texture, places + shift), expected, atol=0.01)
 
 
+@pytest.mark.usefixtures("computes")
 def test_small_pictures_of_a_texture_are_means_of_light_not_of_codes(resources):
     """Half black, half white: half the light, which is 188 in sRGB and not 128."""
     pixels = np.zeros((8, 8, 3), dtype=np.uint8)
@@ -245,6 +248,7 @@ def test_small_pictures_of_a_texture_are_means_of_light_not_of_codes(resources):
     np.testing.assert_allclose(got, 0.5, atol=0.01)
 
 
+@pytest.mark.usefixtures("computes")
 def test_faces_of_a_cube_lie_below_one_another(resources):
     """Right, left, up, down, front, back: along +x, -x, +y, -y, +z, -z."""
     faces = np.random.default_rng(2).integers(0, 256, (6, 3), dtype=np.uint8)

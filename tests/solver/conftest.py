@@ -21,8 +21,8 @@ def animal() -> Atlas:
 
 
 @pytest.fixture
-def gl_backend(opengl: None) -> str:
-    """The GL backend; skipped where no context can be made."""
+def gl_backend(computes: None) -> str:
+    """The GL backend; skipped where it cannot run."""
     return "gl"
 
 

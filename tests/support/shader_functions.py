@@ -13,15 +13,18 @@ import numpy as np
 
 import ripple_sim.render
 from ripple_sim.render import DEFINES
-from ripple_sim.solver.gl import GLContext, load_shader
+from ripple_sim.solver.gl import GLContext
 
 _PACKAGE = "shaders_under_test"
 _WIDTH = 256
-_VERTEX = """#version 430
-void main() { gl_Position = vec4(4.0 * vec2(gl_VertexID == 1, gl_VertexID == 2) - 1.0, 0.0, 1.0); }
-"""
-_FRAGMENT = """#version 430
-{include}
+_SHADER = """#version 410
+#stage vertex
+void main()
+{{
+    gl_Position = vec4(4.0 * vec2(gl_VertexID == 1, gl_VertexID == 2) - 1.0, 0.0, 1.0);
+}}
+#stage fragment
+#include "{include}"
 uniform sampler2D given;
 out vec4 result;
 void main()
@@ -35,8 +38,10 @@ _numbers = itertools.count()
 _cleanup = weakref.finalize(_folder, _folder.cleanup)
 
 
-def _source(include: str, expression: str, defines: dict[str, object]) -> str:
-    """A fragment shader that includes one of the renderer's files by the real loader."""
+def _program(
+    gl: GLContext, include: str, expression: str, defines: dict[str, object]
+) -> moderngl.Program:
+    """A program that includes one of the renderer's files by the real loader."""
     package = Path(_folder.name, _PACKAGE)
     if not package.exists():
         shutil.copytree(
@@ -47,10 +52,10 @@ def _source(include: str, expression: str, defines: dict[str, object]) -> str:
         (package / "__init__.py").touch()
         sys.path.append(_folder.name)
         importlib.invalidate_caches()
-    text = _FRAGMENT.format(include=f'#include "{include}"', expression=expression)
     name = f"under_test_{next(_numbers)}"  # sources are read once
+    text = _SHADER.format(include=include, expression=expression)
     (package / f"{name}.glsl").write_text(text)
-    return load_shader(_PACKAGE, name, "fragment", VARYING="in", **{**DEFINES, **defines})
+    return gl.program(_PACKAGE, name, **{**DEFINES, **defines})
 
 
 def evaluated(
@@ -61,9 +66,8 @@ def evaluated(
     rows = -(-count // _WIDTH)
     given = np.zeros((rows * _WIDTH, 4), dtype=np.float32)
     given[:count, :columns] = inputs
-    source = _source(include, expression, defines)
     with gl as ctx:
-        program = ctx.program(vertex_shader=_VERTEX, fragment_shader=source)
+        program = _program(gl, include, expression, defines)
         texture = ctx.texture((_WIDTH, rows), 4, given.tobytes(), dtype="f4")
         target = ctx.texture((_WIDTH, rows), 4, dtype="f4")
         picture = ctx.framebuffer([target])

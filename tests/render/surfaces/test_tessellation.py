@@ -230,6 +230,7 @@ def drawn_ball(gl) -> Iterator[DrawnBall]:
         yield DrawnBall(renderer, atlas, frame)
 
 
+@pytest.mark.usefixtures("computes")
 @pytest.mark.parametrize("group", [32, 256])
 def test_tessellation_on_the_gpu_gives_the_triangles_of_the_cpu_in_order(
     gl, drawn_ball, group, monkeypatch

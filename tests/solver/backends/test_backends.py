@@ -183,7 +183,7 @@ def test_auto_takes_the_cpu_where_opengl_is_software(opengl: None, operator: Wav
 
 
 @pytest.fixture
-def hardware(opengl: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> GLContext:
+def hardware(computes: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> GLContext:
     """The software driver, taken for a GPU whose speed has not been measured."""
     monkeypatch.setattr(GLContext, "software", False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

@@ -18,7 +18,7 @@ from ripple_sim.solver.backends import FieldLayout, TexelList, bind_buffers
 from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.texels.moving import MovedStencil
 
-pytestmark = pytest.mark.usefixtures("opengl")
+pytestmark = pytest.mark.usefixtures("computes")
 MESHES = [square(1), square(66), flat_torus(17), polygon(3, 9), two_squares(3)]
 
 
