@@ -22,6 +22,7 @@ from ..texels.atlas_file import ADVICE, FORMAT, read_atlas_file
 from ..texels.chart_map import ChartMap, LinearChartMap
 from ..texels.gluing import glue
 from ..texels.texel_mesh import TexelMesh
+from ..texels.texel_quality import folded_texels
 from .choice import LONGEST_TEXEL, texel_length
 from .cube.atlas import CubeChartMap, SphereAtlas, atlas_from_sphere_map
 from .cube.convention import check_memory, check_resolution
@@ -31,6 +32,9 @@ from .sphere_map import certify, conformal_sphere_map, progressive_sphere_map
 
 # Names of the layouts; "auto" chooses between the other two, see `choice`.
 LAYOUTS = ("auto", "cube", "patches")
+
+# Share of the texels of the cube layout that may be folded if "auto" is to take it.
+_MAX_FOLDED_SHARE = 1e-3
 
 # Time between two messages that charts are still being laid [s].
 _MESSAGE_INTERVAL = 15.0
@@ -121,8 +125,8 @@ def build_atlas(
     layout : str
         "cube": six charts of N x N texels, for a closed mesh of genus 0 in one part. "patches":
         many small charts, for any mesh. "auto": the cube for round meshes, and patches for meshes
-        with long limbs, handles, rims or several parts. The choice depends on the mesh alone, and
-        `Atlas.notes` says why a mesh with limbs gets patches.
+        with long limbs, handles, rims or several parts, and where texels of the cube would be
+        folded. `Atlas.notes` says why a closed mesh in one part gets patches.
     sphere : float64 [vertex_count, 3], optional
         Sphere map for the cube layout, if you have one already. `method` is not used then, and
         "auto" takes the cube.
@@ -191,22 +195,47 @@ class _Builder:
         return self._saved(path, self._six_charts(self._sphere_map(self.sphere), start))
 
     def chosen(self) -> Atlas:
-        """Atlas in the layout that suits a closed mesh of genus 0; its sphere map decides."""
+        """Atlas in the layout that suits a closed mesh of genus 0.
+
+        Its sphere map decides, and the texels that are folded in the cube layout.
+        """
         start = time.perf_counter()
         # a file under one of these names shows that the layout was chosen already
         round_path = self._path(f"auto {self.method}")
-        limbed_path = self._path(f"auto {self.method} {self.resolution}")
-        stored = self._stored(round_path, start, "cube")
-        if stored is not None:
-            return self._at_resolution(stored, round_path, start)
-        stored = self._stored(limbed_path, start, "patches", "cube")
+        own_path = self._path(f"auto {self.method} {self.resolution}")
+        stored = self._stored(own_path, start, "patches", "cube")
         if stored is not None:
             return stored
-        sphere = self._sphere_map(None)
-        length = texel_length(self.mesh, sphere)
-        if length > LONGEST_TEXEL:
-            return self._saved(limbed_path, self._limbed(sphere, length, start))
-        return self._saved(round_path, self._six_charts(sphere, start))
+        stored = self._stored(round_path, start, "cube")
+        if stored is not None and stored.resolution == self.resolution:
+            return stored
+        if stored is not None:
+            sphere = self._sphere_map(stored.sphere)
+        else:
+            sphere = self._sphere_map(None)
+            length = texel_length(self.mesh, sphere)
+            if length > LONGEST_TEXEL:
+                return self._saved(own_path, self._limbed(sphere, length, start))
+        cube = self._six_charts(sphere, start)
+        if folded_texels(cube.texels) <= _MAX_FOLDED_SHARE * cube.areas.size:
+            return self._saved(round_path, cube)
+        return self._saved(own_path, self._with_fewer_folds(cube))
+
+    def _with_fewer_folds(self, cube: Atlas) -> Atlas:
+        """An atlas of the patch layout if it has fewer folded texels than one of the cube layout.
+
+        Texels of the cube layout lie astride of the edges of thin plates.
+        """
+        folded = folded_texels(cube.texels)
+        try:
+            patches = _patches(self.mesh, self.resolution)
+        except AtlasError:
+            return cube
+        if folded_texels(patches.texels) >= folded:
+            return cube
+        note = f"layout patches: {counted(folded, 'texel')} of the cube would be folded"
+        timings = {**cube.timings, **patches.timings}
+        return dataclasses.replace(patches, timings=timings, notes=(note, *patches.notes))
 
     def _at_resolution(self, stored: Atlas, path: Path | None, start: float) -> Atlas:
         """A stored atlas of the cube layout, cast again if it has another resolution.

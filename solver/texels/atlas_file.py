@@ -17,7 +17,7 @@ from ..files import atomic_write, final_path
 
 # Version of the file format. Raise it when a layout's map or the contents of the file change: then
 # the cache rebuilds its atlases.
-FORMAT = 18
+FORMAT = 19
 
 # Oldest version that is read: the format of 1.0.0, as `docs/stability.md` says.
 OLDEST = 13

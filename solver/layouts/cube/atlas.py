@@ -27,6 +27,7 @@ from ...texels.atlas import Atlas
 from ...texels.barycentrics import barycentrics_at
 from ...texels.chart_map import Parts, uncut
 from ...texels.detours import link_detours
+from ...texels.normals import facing_out
 from ...texels.stretch import stretch_summary
 from ...texels.texel_atlas import triangles_of
 from ...texels.texel_mesh import TexelMesh
@@ -299,7 +300,7 @@ def _interpolated(mesh: Mesh, triangles: Ints, barycentrics: Floats) -> tuple[Fl
     normals[cancelled] = mesh.vertex_normals[corners[cancelled, 0]]
     lengths[cancelled] = 1.0
     normals /= lengths[:, None]
-    return weights @ mesh.V, normals
+    return weights @ mesh.V, facing_out(normals, mesh, triangles)
 
 
 class SphereAtlas(Atlas):

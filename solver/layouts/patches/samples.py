@@ -17,6 +17,7 @@ from ...errors import AtlasError
 from ...kernel import Bools, Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...mesh.vectors import cross, dot, subtract
+from ...texels.normals import facing_out
 from ...texels.topology import TexelTopology
 from .layout import PatchMap
 from .seamless import Complex, SeamlessMap, follow, places_on_charts, wedge
@@ -260,7 +261,8 @@ def _normals(mesh: Mesh, triangles: Ints, barycentrics: Floats) -> Floats:
     at_corners = mesh.vertex_normals[mesh.F[triangles]]
     normals = np.einsum("...k,...kj->...j", barycentrics, at_corners)
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
-    return np.where(length > 1e-9, normals / np.maximum(length, 1e-9), at_corners[..., 0, :])
+    units = np.where(length > 1e-9, normals / np.maximum(length, 1e-9), at_corners[..., 0, :])
+    return facing_out(units, mesh, triangles)
 
 
 def centres(mesh: Mesh, patches: PatchMap, n: int) -> Samples:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from genus_zero import icosphere
 from hypothesis import HealthCheck, given, settings, strategies as st
 from surfaces import disk
@@ -196,3 +197,22 @@ def test_long_computations_of_charts_are_logged(
     logged = len(caplog.messages)
     time.sleep(0.1)
     assert len(caplog.messages) == logged  # no more once the charts are laid
+
+
+def test_thin_plate_gets_patches_since_texels_of_the_cube_are_folded() -> None:
+    plate = trimesh.creation.box((1.0, 1.0, 0.001))
+    mesh = Mesh.from_arrays(plate.vertices, plate.faces)
+    cube = build_atlas(mesh, 16, cache=False, layout="cube")
+    chosen = build_atlas(mesh, 16, cache=False)
+    assert chosen.layout == "patches"
+    assert chosen.quality()["folded"] < cube.quality()["folded"]
+    assert "of the cube would be folded" in chosen.notes[0]
+
+
+def test_both_sides_of_a_sheet_without_thickness_face_out() -> None:
+    """Every vertex belongs to both sides, so that normals of vertices lie in the sheet."""
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    F = np.array([[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]])
+    atlas = build_atlas(Mesh.from_arrays(V, F), 16, cache=False, layout="patches")
+    up = np.array([1.0, 1.0, -1.0, -1.0])[atlas.triangles]
+    np.testing.assert_allclose(atlas.normals[..., 2], up, atol=1e-12)
