@@ -266,14 +266,9 @@ class Ear:
         begun = left_at > times[0]
         pressure = np.zeros(len(at))
         if begun.any():
-            blocks = np.array_split(left_at[begun], max(1, len(at) // 4096))
             spans = np.full(len(times), self.substep)
-            heard = [
-                filtered(times, spans, reach[:, None], block, base)[:, 0]
-                for block in blocks
-                if len(block)
-            ]
-            pressure[begun] = np.concatenate(heard)
+            heard = filtered(times, spans, reach[:, None], left_at[begun], base)
+            pressure[begun] = heard[:, 0]
         return pressure
 
     def _placement(self, waves: WaveSolver, here: Floats, common: float) -> Placement:

@@ -104,6 +104,7 @@ class CPUBackend:
         self._balance: Balance | None = None
         self._extra: Coefficient = np.float32(0)  # forces beside those of the stencil
         self._shift: Amplitude | None = None  # of velocities, which the next drift adds
+        self._moving = False  # True: it has moved, and may move still
         # step length [s] and `keeps_volume` for which the coefficients are prepared
         self._prepared = (0.0, keeps_volume)
         self._load = NO_LOAD
@@ -122,6 +123,7 @@ class CPUBackend:
         """Replace the velocity [m/s]; earlier kicks are gone."""
         self.fields.set_velocity(velocity)
         self._shift = None
+        self._moving = False  # unless the next step finds otherwise
 
     def snapshot(self) -> NDArray[np.float32]:
         """Copy of the height [m]."""
@@ -148,7 +150,11 @@ class CPUBackend:
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
-        coefficients = self._prepare(dt)
+        sum_count = 0 if self._probes is None else len(self._probes.heights)
+        self._sums = np.zeros((substeps, sum_count), np.float32)
+        coefficients = self._prepare(dt)  # it checks them, so before a step at rest too
+        if self._rests():
+            return
         acceleration = (
             self._pressure(self._load.acceleration)
             if self._balance is None
@@ -172,8 +178,6 @@ class CPUBackend:
             dent=_NO_DENT if fields.dent is None else fields.dent.reshape(-1),
             halo=self._layout.halo,
         )
-        sum_count = 0 if self._probes is None else len(self._probes.heights)
-        self._sums = np.zeros((substeps, sum_count), np.float32)
         step = functools.partial(
             advance,
             substeps,
@@ -228,6 +232,24 @@ class CPUBackend:
             )
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
+
+    def _rests(self) -> bool:
+        """Whether the surface is flat, does not move, and nothing pushes it: steps change nothing.
+
+        Surfaces often wait for the first hit. A surface that has moved never comes to rest exactly.
+        """
+        if not self._moving:
+            load = self._load
+            fields = self.fields
+            self._moving = bool(
+                self._shift is not None
+                or np.any(load.forces)
+                or np.any(load.acceleration)
+                or fields.dent is not None
+                or fields.h.any()
+                or fields.v.any()
+            )
+        return not self._moving
 
     def _raise_crests(self, crests: NDArray[np.float32]) -> None:
         """Raise the crests to the size of the height where that is greater."""

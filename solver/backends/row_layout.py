@@ -123,6 +123,7 @@ class RowLayout:
             begins=links.begins,
             others=self.addresses[links.others],
             weights=links.weights.astype(np.float32),
+            ends=np.zeros(len(links.others), np.float32),
         )
         return Weights(rows, self.columns, irregular)
 

@@ -29,6 +29,7 @@ class Links(NamedTuple):
     begins: Ints  # where the links of each texel begin, [k + 1]
     others: Ints  # address of each link's other end, [links]
     weights: Floats32  # weight of each link, [links]
+    ends: Floats32  # room for the field at the other end of each link, [links]
 
 
 class Weights(NamedTuple):
@@ -93,16 +94,6 @@ def force_at(
     )
 
 
-@kernel(no_cpython_wrapper=True)
-def irregular_force(links: Links, i: int, h: Floats32) -> np.float32:
-    """Sum of weight (h_j - h_i) over the irregular links of texel i of the list."""
-    height = h[links.addresses[i]]
-    force = np.float32(0)
-    for k in range(links.begins[i], links.begins[i + 1]):
-        force += links.weights[k] * (h[links.others[k]] - height)
-    return force
-
-
 class Share(NamedTuple):
     """One thread's share of a step."""
 
@@ -110,6 +101,32 @@ class Share(NamedTuple):
     last_row: int  # the row after the last
     first_address: int  # in a field with halo
     last_address: int  # the address after the last
+
+
+@kernel(no_cpython_wrapper=True)
+def look_along(links: Links, h: Floats32, own: Share) -> None:
+    """Copy the field at the other ends of the links of the thread's own texels."""
+    for i in range(len(links.texels)):
+        if own.first_address <= links.addresses[i] < own.last_address:
+            for k in range(links.begins[i], links.begins[i + 1]):
+                links.ends[k] = h[links.others[k]]
+
+
+@kernel(fastmath={"contract", "reassoc"}, no_cpython_wrapper=True)
+def irregular_force(links: Links, i: int, here: np.float32) -> np.float32:
+    """Sum of weight (h_j - h_i) over the irregular links of texel i of the list.
+
+    `look_along` comes before. The order of the sum is the compiler's, as a plate has dozens of
+    links to a texel.
+    """
+    first = links.begins[i]
+    last = links.begins[i + 1]
+    ends = links.ends[first:last]
+    weights = links.weights[first:last]
+    force = np.float32(0)
+    for k in range(len(ends)):
+        force += weights[k] * (ends[k] - here)
+    return force
 
 
 @kernel(no_cpython_wrapper=True)
@@ -166,15 +183,21 @@ def apply(
             force *= value_in(factors, c - 1)
             result[c] = result[c] + force if add else force
     irregular = stencil.irregular
+    look_along(irregular, h, own)
     for i in range(len(irregular.texels)):
         address = irregular.addresses[i]
         if own.first_address <= address < own.last_address:
-            force = value_in(factor, irregular.texels[i]) * irregular_force(irregular, i, h)
-            out[address] += force
+            force = irregular_force(irregular, i, h[address])
+            out[address] += value_in(factor, irregular.texels[i]) * force
 
 
 _NO_LINKS = Links(
-    texels=NO_INTS, addresses=NO_INTS, begins=NO_INTS, others=NO_INTS, weights=NO_FLOATS
+    texels=NO_INTS,
+    addresses=NO_INTS,
+    begins=NO_INTS,
+    others=NO_INTS,
+    weights=NO_FLOATS,
+    ends=NO_FLOATS,
 )
 NO_WEIGHTS = Weights(rows=np.zeros((0, 4, 0, 0), np.float32), columns=0, irregular=_NO_LINKS)
 

@@ -31,6 +31,7 @@ from .stencil_kernels import (
     fill,
     force_at,
     irregular_force,
+    look_along,
     row_of,
     share_of,
     value_in,
@@ -145,10 +146,12 @@ def kick_drift(
             velocity[c] = new
             result[c] = row[c] + dt * new
     irregular = kick.stencil.irregular
+    look_along(irregular, h, own)
     for i in range(len(irregular.texels)):
         address = irregular.addresses[i]
         if own.first_address <= address < own.last_address:
-            kicked = kick.gain[irregular.texels[i]] * irregular_force(irregular, i, h)
+            force = irregular_force(irregular, i, h[address])
+            kicked = kick.gain[irregular.texels[i]] * force
             v[address] += kicked
             h_next[address] += dt * kicked
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..backends.backend import Backend
 from ..backends.probes import Probes
 from ..errors import POSITIVE, SolverError, shown
+from ..kernel import Floats, Ints, kernel
 from ..operator.material import Material, frequency
 from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
@@ -34,8 +35,6 @@ _ATTENUATION = 80.0  # [dB]
 _TABULATED = 512  # tabulated values of the filter for each sample
 _HALVED_SHARE = 0.42  # frequency that the filter halves, as a share of the rate
 _PASSED_SHARE = 0.34
-
-_BLOCK_SAMPLES = 4096  # samples that are computed together: their weights take some MB
 
 # A texel and the four beside it.
 _TEXELS_IN_CROSS = 5
@@ -257,11 +256,11 @@ class Sensor:
         spans = np.concatenate([kept_spans, spans])
         values = np.concatenate([kept_values, values])
         sample_times = self._start + np.arange(self._next, until + 1) / self.rate
-        samples = [self._unread.values]
-        for i in range(0, len(sample_times), _BLOCK_SAMPLES):
-            block = sample_times[i : i + _BLOCK_SAMPLES]
-            samples.append(filtered(times, spans, values, block, self._base).astype(np.float32))
-        self._unread = Samples(np.append(self._unread.times, sample_times), np.concatenate(samples))
+        samples = filtered(times, spans, values, sample_times, self._base).astype(np.float32)
+        self._unread = Samples(
+            np.append(self._unread.times, sample_times),
+            np.concatenate([self._unread.values, samples]),
+        )
         self._next = until + 1
         next_time = self._start + self._next / self.rate
         first_kept = np.searchsorted(times, next_time - self.latency)
@@ -302,19 +301,51 @@ def filtered(
     reach = _FILTER_REACH / rate
     first = np.searchsorted(times, at - reach)
     last = np.searchsorted(times, at + reach)
-    places = first[:, None] + np.arange((last - first).max())
-    is_within_reach = places < last[:, None]
-    places = np.minimum(places, len(times) - 1)
-    # how far each value is from the middle of the filter, in steps of its table
-    steps = np.minimum(
-        np.abs(times[places] - at[:, None]) * (rate * _TABULATED), _FILTER_REACH * _TABULATED
-    )
-    index = steps.astype(np.int64)
-    taps, slopes = _filter()
-    filter_values = taps[index] + slopes[index] * (steps - index)
-    weights = filter_values * spans[places] * is_within_reach
-    shares = weights / weights.sum(axis=1, keepdims=True)
-    return np.einsum("kw,kwp->kp", shares, values[places])
+    result = np.zeros((len(at), values.shape[1]))
+    filter_values = Filter(*_filter(), rate * _TABULATED)
+    _filter_values(Signal(times, spans, values), at, filter_values, first, last, result)
+    return result
+
+
+class Signal(NamedTuple):
+    """Values [m, points] that hold for spans [s], [m], round times [s], [m]."""
+
+    times: Floats
+    spans: Floats
+    values: Floats
+
+
+class Filter(NamedTuple):
+    """The filter's values from its middle on, the steps between them, and values a second."""
+
+    taps: Floats
+    slopes: Floats
+    rate: float
+
+
+@kernel
+def _filter_values(
+    signal: Signal, at: Floats, low_pass: Filter, first: Ints, last: Ints, result: Floats
+) -> None:
+    """Filter the values `first` to `last` for each time in `at`; see `filtered`.
+
+    Stiff plates have hundreds of substeps in a sample: the weights of a second of sound are a
+    hundred million, which NumPy would write to memory ten times.
+    """
+    end = len(low_pass.taps) - 1
+    for i in range(len(at)):
+        total = 0.0
+        for j in range(first[i], last[i]):
+            # how far the value is from the middle of the filter, in steps of its table
+            steps = min(abs(signal.times[j] - at[i]) * low_pass.rate, float(end))
+            index = int(steps)
+            tap = low_pass.taps[index] + low_pass.slopes[index] * (steps - index)
+            weight = tap * signal.spans[j]
+            total += weight
+            for point in range(result.shape[1]):
+                result[i, point] += weight * signal.values[j, point]
+        for point in range(result.shape[1]):
+            result[i, point] /= total
 
 
 @functools.cache

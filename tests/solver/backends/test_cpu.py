@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
-from ripple_sim.solver import Material, TexelMesh, texel_atlas
+from ripple_sim.solver import Material, TexelMesh, sphere_atlas, texel_atlas
 from ripple_sim.solver.backends import CPUBackend, TexelLoad, advance
 from ripple_sim.solver.backends.probes import Probes
 from ripple_sim.solver.operator import WaveOperator, build_operator
@@ -236,3 +236,24 @@ def test_any_number_of_threads_gives_the_same_bits(mesh: str, material: str) -> 
     for result in results[1:]:
         for values, expected in zip(result, results[0], strict=True):
             np.testing.assert_array_equal(values, expected)
+
+
+def test_a_surface_at_rest_begins_with_any_push() -> None:
+    operator = build_operator(sphere_atlas(1.0, 8), Material(stiffness=1.0), "fem")
+    one = np.ones(1, np.int64)
+    pushes = {
+        "kick": lambda waves: waves.kick(one, np.ones(1, np.float32), 0.0),
+        "kick of all": lambda waves: waves.kick(one[:0], np.ones(0, np.float32), 1.0),
+        "force": lambda waves: waves.hold(TexelLoad(one, np.ones(1), 0.0)),
+        "pressure": lambda waves: waves.hold(TexelLoad(one[:0], np.ones(0), 1.0)),
+        "height": lambda waves: waves.fields.set_height(np.ones((6, 8, 8), np.float32)),
+        "velocity": lambda waves: waves.set_velocity(np.ones((6, 8, 8), np.float32)),
+    }
+    for name, push in pushes.items():
+        backend = CPUBackend(operator)
+        backend.advance(3, 1e-3)
+        assert not backend.fields.height().any()
+        push(backend)
+        before = backend.fields.height()
+        backend.advance(3, 1e-3)
+        assert (backend.fields.height() != before).any(), name
