@@ -42,7 +42,7 @@ def main(source: str, target: str) -> None:
         colors.append(_colors(mesh, len(points)))
         material.append(np.full(len(triangles), mesh.material_index))
         count += len(points)
-    materials = [_material(each) for each in scene.materials]
+    materials = [_material(material) for material in scene.materials]
     np.savez(
         target,
         V=np.concatenate(V),

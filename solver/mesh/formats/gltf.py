@@ -218,7 +218,8 @@ class _Reader:
                 color = np.ones((len(part.V), 4)) if part.colors is None else part.colors
                 rows.append(color[part.F])
             colors = np.concatenate(rows)
-        words = sorted(set().union(*(each.not_shown for each in self._materials.values())))
+        not_shown = [material.not_shown for material in self._materials.values()]
+        words = sorted(set().union(*not_shown))
         notes = (f"not shown of its materials: {', '.join(words)}",) if words else ()
         return Looks(tuple(paints), np.concatenate(paint), colors, notes), corner_uv
 
@@ -349,15 +350,15 @@ def _instances(
 ) -> list[NDArray[np.float64]]:
     """Transforms of the instances of a node (EXT_mesh_gpu_instancing)."""
     attributes = node["extensions"][_INSTANCES].get("attributes", {})
-    given = {
+    transforms = {
         name: document.numbers(attributes[name])
         for name in ("TRANSLATION", "ROTATION", "SCALE")
         if name in attributes
     }
-    count = min((len(values) for values in given.values()), default=1)
-    move = given.get("TRANSLATION", np.zeros((count, 3)))
-    turn = given.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
-    size = given.get("SCALE", np.ones((count, 3)))
+    count = min((len(values) for values in transforms.values()), default=1)
+    move = transforms.get("TRANSLATION", np.zeros((count, 3)))
+    turn = transforms.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
+    size = transforms.get("SCALE", np.ones((count, 3)))
     return [world @ _composed(move[i], turn[i], size[i]) for i in range(count)]
 
 

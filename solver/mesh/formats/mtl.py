@@ -251,12 +251,13 @@ def _in_any_case(folder: Path, name: PurePosixPath) -> Path | None:
             continue
         if part != ".." and not _exists(path / part):
             try:
-                alike = sorted(each for each in path.iterdir() if each.name.lower() == part.lower())
+                entries = sorted(path.iterdir())
             except OSError:
                 return None
-            if not alike:
+            matches = [entry.name for entry in entries if entry.name.lower() == part.lower()]
+            if not matches:
                 return None
-            part = alike[0].name
+            part = matches[0]
         path = path / part
     return _regular(path)
 

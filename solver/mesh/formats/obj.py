@@ -148,32 +148,34 @@ def _looks(
     """Looks of triangles, and their texture coordinates, moved as their materials say."""
     defined, lost = libraries
     used = [statements.materials[i] for i in np.unique(material)]
-    found = {name: defined.get(name, defined.get(name.lower())) for name in used}
-    missing = [name for name in used if name and found[name] is None]
+    definitions = {name: defined.get(name, defined.get(name.lower())) for name in used}
+    missing = [name for name in used if name and definitions[name] is None]
     notes = list(lost)
     if missing and defined:
-        shown = ", ".join(missing[:3]) + (", ..." if len(missing) > 3 else "")
-        notes.append(f"{counted(len(missing), 'material')} not defined: {shown}")
+        names = ", ".join(missing[:3]) + (", ..." if len(missing) > 3 else "")
+        notes.append(f"{counted(len(missing), 'material')} not defined: {names}")
+    materials = [definition for definition in definitions.values() if definition is not None]
     words: set[str] = set()
-    for each in found.values():
-        words |= each.not_shown if each is not None else set()
+    for definition in materials:
+        words |= definition.not_shown
     if words:
         notes.append(f"not shown of its materials: {', '.join(sorted(words))}")
     colors = _colors(statements, F)
-    if colors is None and not any(each is not None for each in found.values()):
-        return (Looks((), np.zeros(len(F), np.int64), None, tuple(notes)) if notes else None), (
-            corner_uv
-        )
+    if colors is None and not materials:
+        bare = Looks((), np.zeros(len(F), np.int64), None, tuple(notes)) if notes else None
+        return bare, corner_uv
     place = {statements.materials.index(name): k for k, name in enumerate(used)}
     paint = np.array([place[i] for i in material.tolist()], dtype=np.int64)
     paints = []
     for k, name in enumerate(used):
-        each = found[name]
-        paints.append(Paint() if each is None else each.paint)
-        if each is not None and corner_uv is not None and not each.keeps_uv:
-            corner_uv = np.where(
-                (paint == k)[:, None, None], corner_uv * each.uv_scale + each.uv_offset, corner_uv
-            )
+        material_of_name = definitions[name]
+        if material_of_name is None:
+            paints.append(Paint())
+            continue
+        paints.append(material_of_name.paint)
+        if corner_uv is not None and not material_of_name.keeps_uv:
+            moved_uv = corner_uv * material_of_name.uv_scale + material_of_name.uv_offset
+            corner_uv = np.where((paint == k)[:, None, None], moved_uv, corner_uv)
     return Looks(tuple(paints), paint, colors, tuple(notes)), corner_uv
 
 
@@ -182,8 +184,8 @@ def _colors(statements: _ObjStatements, F: NDArray[np.int64]) -> NDArray[np.floa
     if not statements.colored:
         return None
     colors = np.ones((len(statements.coordinates) // 3, 4))
-    given = unit_range(numbers(statements.colors).reshape(-1, 3))
-    colors[statements.colored] = with_opacity(linear_light(given))
+    srgb = unit_range(numbers(statements.colors).reshape(-1, 3))
+    colors[statements.colored] = with_opacity(linear_light(srgb))
     return colors[F]
 
 

@@ -184,7 +184,7 @@ def _faces(
 
 def _face_colors(words: list[list[str]]) -> NDArray[np.float64] | None:
     """Colours of faces [face_count, 4]; None unless some have three or four numbers."""
-    colored = [i for i, each in enumerate(words) if len(each) in _COLOR_SIZES]
+    colored = [i for i, row in enumerate(words) if len(row) in _COLOR_SIZES]
     if not colored:
         return None
     colors = np.ones((len(words), 4))
@@ -197,7 +197,7 @@ def _vertex_colors(rows: list[list[str]], header: _Header) -> NDArray[np.float64
     first = 3 + 3 * header.normals
     last = -2 if header.pairs else None
     words = [row[first:last] for row in rows]
-    sizes = {len(each) for each in words}
+    sizes = {len(row) for row in words}
     if not sizes or not sizes <= set(_COLOR_SIZES):
         return None
     # without a header that says so, three more numbers may be a normal

@@ -143,7 +143,7 @@ def read_binary(element: Element, data: bytes, order: str) -> tuple[dict[str, An
 
 def _read_rows(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
     columns: dict[str, list[NDArray]] = {name: [] for name, _, _ in element.columns}
-    given = [
+    readers = [
         (
             columns[name],
             np.dtype(order + kind),
@@ -154,7 +154,7 @@ def _read_rows(element: Element, data: bytes, order: str) -> tuple[dict[str, Any
     at = 0
     try:
         for _ in range(element.rows):
-            for column, kind, length in given:
+            for column, kind, length in readers:
                 size = 1
                 if length is not None:
                     size = int(np.frombuffer(data, length, 1, at)[0])

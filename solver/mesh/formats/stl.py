@@ -72,17 +72,17 @@ def _looks(bits: NDArray[np.uint16], comment: bytes) -> Looks | None:
     """Colours of the 16 bits of each triangle, if they are colours."""
     channels = np.stack([bits >> 10, bits >> 5, bits], axis=1) & _CHANNEL
     colored = bits >= 1 << 15
-    rest = np.ones(4)
+    uncolored = np.ones(4)
     at = comment.find(_MAGICS)
     if at >= 0:
         # red is the lowest; the highest bit stands for the colour of the comment
         channels = channels[:, ::-1]
         colored = ~colored
-        given = comment[at + len(_MAGICS) :][:4].ljust(4, b"\xff")
-        rest = np.frombuffer(given, np.uint8) / 255
+        rgba = comment[at + len(_MAGICS) :][:4].ljust(4, b"\xff")
+        uncolored = np.frombuffer(rgba, np.uint8) / 255
     elif not colored.any():
         return None
-    colors = np.tile(rest, (len(bits), 1))
+    colors = np.tile(uncolored, (len(bits), 1))
     colors[colored, :3] = channels[colored] / _CHANNEL
     colors = np.repeat(linear_light(colors)[:, None], 3, axis=1)
     return Looks((Paint(),), np.zeros(len(bits), np.int64), colors)
