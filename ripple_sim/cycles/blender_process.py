@@ -1,9 +1,8 @@
 """Render a USD stage with Cycles: `python blender_process.py SETTINGS.json`.
 
-It runs in a process of its own.
-
-Blender is under the GPL, which is why nothing of ripple-sim is imported here and only files and
-lines pass between the two. Each frame becomes NUMBER.npy, linear, and then the line "frame NUMBER".
+It runs in a process of its own. Blender is under the GPL, which is why nothing of ripple-sim is
+imported here and only files and lines pass between the two. Each frame becomes NUMBER.npy, linear,
+and then the line "frame NUMBER".
 """
 
 import json
@@ -29,10 +28,10 @@ def main(settings):
         create_world_material=False,
     )
     scene = bpy.context.scene
-    scene.camera = next(each for each in scene.objects if each.type == "CAMERA")
+    scene.camera = next(item for item in scene.objects if item.type == "CAMERA")
     set_rendering(scene, settings)
     box_axes = set_world(scene, settings)
-    for lamp in (each for each in scene.objects if each.type == "LIGHT"):
+    for lamp in [item for item in scene.objects if item.type == "LIGHT"]:
         # the importer makes lamps four times as strong, and suns twice as wide
         lamp.data.energy = lamp.data["power"]
         if lamp.data.type == "SUN":
@@ -98,13 +97,13 @@ def set_world(scene, settings):
     nodes = tree.nodes
     links = tree.links
     nodes.clear()
-    rays, direction, parts = (
-        nodes.new(f"ShaderNode{kind}") for kind in ("LightPath", "TexCoord", "SeparateXYZ")
-    )
-    links.new(direction.outputs["Generated"], parts.inputs[0])
-    seen = mixed(
+    rays = nodes.new("ShaderNodeLightPath")
+    direction = nodes.new("ShaderNodeTexCoord")
+    coordinates = nodes.new("ShaderNodeSeparateXYZ")
+    links.new(direction.outputs["Generated"], coordinates.inputs[0])
+    sky_color = mixed(
         tree,
-        smooth_step(tree, parts.outputs["Z"], -0.1, 0.8),
+        smooth_step(tree, coordinates.outputs["Z"], -0.1, 0.8),
         settings["horizon"],
         settings["zenith"],
     )
@@ -112,10 +111,10 @@ def set_world(scene, settings):
     diffuse = vectors(tree, "SCALE", boxes, settings["boxes_diffuse"])
     diffuse = vectors(tree, "ADD", settings["sky"], diffuse)
     glossy = vectors(tree, "SCALE", boxes, settings["boxes_reflected"])
-    glossy = vectors(tree, "ADD", glossy, vectors(tree, "SCALE", seen, 0.75))
+    glossy = vectors(tree, "ADD", glossy, vectors(tree, "SCALE", sky_color, 0.75))
     color = mixed(tree, rays.outputs["Is Glossy Ray"], diffuse, glossy)
     for kind in ("Is Camera Ray", "Is Transmission Ray"):
-        color = mixed(tree, rays.outputs[kind], color, seen)
+        color = mixed(tree, rays.outputs[kind], color, sky_color)
     background = nodes.new("ShaderNodeBackground")
     output = nodes.new("ShaderNodeOutputWorld")
     links.new(color, background.inputs["Color"])
@@ -201,7 +200,8 @@ def set_look(material, depth):
         return
     color = shader.inputs["Base Color"].default_value
     shader.inputs["Subsurface Weight"].default_value = material["translucency"]
-    shader.inputs["Subsurface Radius"].default_value = tuple(max(each, 0.05) for each in color[:3])
+    radius = tuple(max(channel, 0.05) for channel in color[:3])
+    shader.inputs["Subsurface Radius"].default_value = radius
     shader.inputs["Subsurface Scale"].default_value = depth
     shader.inputs["Sheen Weight"].default_value = material["sheen"]
     shader.inputs["Sheen Tint"].default_value = color
@@ -227,8 +227,8 @@ def fading_floor(settings):
 
     Returns the node that takes the point from which the floor fades.
     """
-    meshes = (each for each in bpy.data.objects if each.type == "MESH")
-    floor = next((each for each in meshes if each.name.split(".")[0] == settings["floor"]), None)
+    meshes = [item for item in bpy.data.objects if item.type == "MESH"]
+    floor = next((mesh for mesh in meshes if mesh.name.split(".")[0] == settings["floor"]), None)
     if floor is None or not floor.data.materials:
         return None
     material = floor.data.materials[0] = floor.data.materials[0].copy()
@@ -243,8 +243,9 @@ def fading_floor(settings):
     apart = nodes.new("ShaderNodeVectorMath")
     apart.operation = "DISTANCE"
     links.new(place.outputs["Position"], apart.inputs[0])
-    near, far = (each * settings["distance"] for each in settings["fade"])
-    share = smooth_step(tree, apart.outputs["Value"], near, far)
+    fade_begin, fade_end = settings["fade"]  # in distances of the focus
+    focus = settings["distance"]
+    share = smooth_step(tree, apart.outputs["Value"], fade_begin * focus, fade_end * focus)
     glow = nodes.new("ShaderNodeEmission")
     mix = nodes.new("ShaderNodeMixShader")
     glow.inputs["Color"].default_value = (*settings["horizon"], 1.0)

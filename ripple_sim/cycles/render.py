@@ -94,22 +94,25 @@ def python_with_bpy() -> str:
     python = named or sys.executable
     version = _version_of_bpy(python)
     if version < OLDEST:
-        found, oldest = (".".join(map(str, each)) for each in (version, OLDEST))
-        raise VideoError(f"{python} must have bpy {oldest} or later, got {found}: {_ADVICE}")
+        oldest = ".".join(map(str, OLDEST))
+        installed = ".".join(map(str, version))
+        raise VideoError(f"{python} must have bpy {oldest} or later, got {installed}: {_ADVICE}")
     return python
 
 
 @functools.cache  # asking takes most of a second
 def _version_of_bpy(python: str) -> tuple[int, ...]:
+    """Version of the bpy of a Python; raises `VideoError` if it cannot be imported."""
     code = "import bpy; print(*bpy.app.version)"
-    asked = subprocess.run(
+    process = subprocess.run(
         [python, "-c", code], capture_output=True, text=True, errors="replace", check=False
     )
-    last = (asked.stdout if asked.returncode == 0 else asked.stderr).strip().splitlines()[-1:]
+    output = process.stdout if process.returncode == 0 else process.stderr
+    last_line = output.strip().splitlines()[-1:]
     try:
-        return tuple(map(int, last[0].split()))
+        return tuple(map(int, last_line[0].split()))
     except (IndexError, ValueError):
-        reason = "".join(last)[:_MAX_REASON_LENGTH] or f"status {asked.returncode}"
+        reason = "".join(last_line)[:_MAX_REASON_LENGTH] or f"status {process.returncode}"
         raise VideoError(f"{python} cannot import bpy: {reason}; {_ADVICE}") from None
 
 
@@ -158,15 +161,16 @@ def frames_of_cycles(
 
 
 def _wait_for(number: int, process: subprocess.Popen, errors: Path) -> None:
-    """Read what the process says until it has made a frame; the rest is Blender's own."""
-    last = ""
+    """Read the lines of the process until it names the frame; other lines are Blender's own."""
+    last_line = ""
     for line in process.stdout or ():
         text = line.decode(errors="replace").strip()
         if text == f"frame {number}":
             return
-        last = text or last
-    said = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    reason = (said[-1] if said else last)[:_MAX_REASON_LENGTH] or "without a word"
+        last_line = text or last_line
+    error_lines = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    reason = error_lines[-1] if error_lines else last_line
+    reason = reason[:_MAX_REASON_LENGTH] or "without a word"
     raise VideoError(f"Blender ended before frame {number} with status {process.wait()}: {reason}")
 
 
@@ -230,9 +234,8 @@ def render_cycles(
 ) -> ExportSummary:
     """Simulate a scene, and write a video with frames rendered by Cycles.
 
-    Camera, lamps and looks are those of the OpenGL renderer.
-
-    The run goes to a USD file in a temporary folder, which a process of Blender's own renders.
+    Camera, lamps and looks are those of the OpenGL renderer. The run goes to a USD file in a
+    temporary folder, which a process of Blender's own renders.
 
     Parameters
     ----------

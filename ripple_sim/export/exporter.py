@@ -232,12 +232,12 @@ class Exporter:
 
         An earlier file in the same place stays.
         """
-        kept = ""
+        note = ""
         if self._place is not None:
-            kept = self._writer.close()
+            note = self._writer.close()
             self._place.remove()
             self._place = None
-        return kept
+        return note
 
     def _repr_html_(self) -> str:
         """HTML for a notebook: the player of a complete page, or what was written."""
@@ -255,9 +255,9 @@ class Exporter:
         if error is None:
             self.close()
         else:
-            kept = self.discard()
-            if kept:
-                error.add_note(kept)
+            note = self.discard()
+            if note:
+                error.add_note(note)
 
     @contextlib.contextmanager
     def _reported(self) -> Iterator[None]:

@@ -115,9 +115,12 @@ class PageContent:
             text = shader.read_text("utf-8")
             yield f'<script type="x-shader" id="{shader.name}">\n{text}</script>\n'
         parts = self._parts()
-        arrays = b"".join(array.tobytes() for part in parts for array in part.arrays)
+        arrays = bytearray()
+        for part in parts:
+            for array in part.arrays:
+                arrays += array.tobytes()
         yield json_script('id="meta"', {**self._meta(parts, data), **settings})
-        yield f'<script type="text/plain" id="arrays">{packed(arrays)}</script>\n'
+        yield f'<script type="text/plain" id="arrays">{packed(bytes(arrays))}</script>\n'
         for number, target in enumerate(self.targets.values()):
             law = target.begin()
             if law:
@@ -187,12 +190,13 @@ class PageContent:
             moved.append(coded_places)
         frames = {"poses": self._poses, "arrows": self._arrows, "middles": middles, "waves": waves}
         text = json.dumps(frames).encode()
-        by_frame = [plane for frame in zip(*heights, strict=True) for plane in frame]
+        by_frame: list[bytes] = []
+        for planes in zip(*heights, strict=True):
+            by_frame += planes
         self._poses = []
         self._arrows = []
-        return PageChunk(
-            motions, len(text).to_bytes(4, "little") + text + b"".join(by_frame + moved)
-        )
+        text_length = len(text).to_bytes(4, "little")
+        return PageChunk(motions, text_length + text + b"".join(by_frame + moved))
 
     def end(self) -> None:
         """End all recordings."""

@@ -62,16 +62,18 @@ class Unfinished:
         """Move everything to its place, unless a foreign file has appeared there."""
         # a second check, since a run takes long
         _check_replaceable(self._target, self._recognised, self._overwrite)
-        made = {".png": made_here, ".usdc": self._recognised}
+        recognised = {".png": made_here, ".usdc": self._recognised}
 
-        def own(file: Path) -> bool:
-            return file.suffix in made and (self._overwrite or made[file.suffix](file))
+        def is_replaceable(file: Path) -> bool:
+            if file.suffix not in recognised:
+                return False
+            return self._overwrite or recognised[file.suffix](file)
 
         # the target itself comes last
         written = sorted(self._folder.iterdir(), key=lambda path: path == self.path)
         for folder in written[:-1]:  # of images or chunks
             kind = folder.suffix.removeprefix(".")
-            check_folder(ExportError, kind, self._target.with_name(folder.name), own)
+            check_folder(ExportError, kind, self._target.with_name(folder.name), is_replaceable)
         for path in written:
             target = self._target.with_name(path.name)
             if target.is_dir():
@@ -203,14 +205,17 @@ def check_export(
         If nothing can be written there.
     """
     ending = ending_of(path)
-    for wanted, able, option in (
+    # whether an option is requested, the attribute of endings that support it, and its name
+    for is_requested, attribute, option in (
         (chunked, "chunks", "chunk"),
         (timed, "one_time", "time"),
         (colored, "meshes", "height_colors"),
     ):
-        if wanted and not getattr(ending, able):
-            valid = ", ".join(suffix for suffix, each in ENDINGS.items() if getattr(each, able))
-            raise ExportError(f"{option} is only for {valid}, not for {path.name}; leave it out")
+        if is_requested and not getattr(ending, attribute):
+            supporting = [suffix for suffix in ENDINGS if getattr(ENDINGS[suffix], attribute)]
+            raise ExportError(
+                f"{option} is only for {', '.join(supporting)}, not for {path.name}; leave it out"
+            )
     try:
         final = final_path(path)
         # the ending chooses the writer and `made_here`

@@ -60,7 +60,8 @@ class WavWriter(Writer):
             channels = [samples[:count] for samples in sampled]
             signals = np.concatenate(channels, axis=1).astype(np.float64)
             rate = next(iter(source.sensors.values())).rate
-            unit = " or ".join(dict.fromkeys(UNITS[each.kind] for each in source.sensors.values()))
+            units = [UNITS[sensor.kind] for sensor in source.sensors.values()]
+            unit = " or ".join(dict.fromkeys(units))
             bandwidth = min(sensor.bandwidth for sensor in source.sensors.values())
         self.note = scale_note(signals, unit, bandwidth / source.slow_motion)
         write_wav(self._path, signals * gain(signals), round(rate / source.slow_motion))

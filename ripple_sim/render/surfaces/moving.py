@@ -47,12 +47,14 @@ class MovingVertices:
     ) -> None:
         self._V = np.ascontiguousarray(V, np.float64)
         self._F = np.ascontiguousarray(F, np.int64)
-        rest = [np.ascontiguousarray(each, np.float64) for each in (points, directions, normals)]
-        triangle, closest = ClosestPoints(self._V, self._F)(rest[0])
+        points = np.ascontiguousarray(points, np.float64)
+        directions = np.ascontiguousarray(directions, np.float64)
+        normals = np.ascontiguousarray(normals, np.float64)
+        triangle, closest = ClosestPoints(self._V, self._F)(points)
         corners = self._F[triangle]
         weights = barycentrics_in(self._V[corners], closest)
-        offset = rest[0] - np.einsum("ij,ijk->ik", weights, self._V[corners])
-        self.rest = corners, weights, offset, *rest[1:]
+        offset = points - np.einsum("ij,ijk->ik", weights, self._V[corners])
+        self.rest = corners, weights, offset, directions, normals
 
     def __call__(self, V: NDArray[np.float64]) -> tuple[Floats32, Floats32, Floats32]:
         """Points [m], directions of displacement and normals for vertices [k, 3] [m].

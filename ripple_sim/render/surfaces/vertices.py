@@ -164,7 +164,7 @@ def tessellated(
     parts, V, normals = rounded_parts(mesh, charts.map)
     F = parts.F
     corner_uv = None if corner_uv is None else parts.carry(corner_uv)
-    each, split_F, normals, uv, coordinates = split_corners(
+    vertex, split_F, normals, uv, coordinates = split_corners(
         V, F, corner_uv, parts.coordinates, normals
     )
     baked = np.zeros((len(mesh.V), 3)) if baked is None else baked
@@ -173,9 +173,9 @@ def tessellated(
         at_parts[F] = parts.carry(np.concatenate([smooth, baked], axis=1)[mesh.F])
         smooth = normalized(at_parts[:, :3])
         baked = at_parts[:, 3:]
-    _, same = np.unique(np.column_stack([each, normals]), axis=0, return_inverse=True)
+    _, same = np.unique(np.column_stack([vertex, normals]), axis=0, return_inverse=True)
     attributes = np.concatenate(
-        [V[each], normals, coordinates, smooth[each], baked[each], uv], axis=1
+        [V[vertex], normals, coordinates, smooth[vertex], baked[vertex], uv], axis=1
     )
     return tessellate(
         split_F,

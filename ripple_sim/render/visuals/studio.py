@@ -21,6 +21,27 @@ _KEY_TANGENT = 0.10  # of its angular radius
 _KEY_AZIMUTH = 92.0  # from the camera's forward axis, left is positive [degrees]
 _KEY_ELEVATION = 44.0  # [degrees]
 
+# Brightness of the soft boxes' reflections beside lights of the MJCF.
+BESIDE_LIGHTS = 0.5
+
+# Share of the floor's colour that the background takes on, at most.
+_MAX_FLOOR_TINT = 0.6
+
+# Linear colour of the background where there is no floor, and colour overhead over the colour at
+# the horizon.
+_BARE_TINT = np.array([0.40, 0.42, 0.46])
+_ZENITH_TINT = np.array([0.36, 0.40, 0.48])
+
+# Radiance of the studio's sky over the mean colour of its background, and how much the horizon and
+# the zenith count in this mean.
+_STUDIO_SKY = 0.75
+_HORIZON_SHARE = 0.7
+_ZENITH_SHARE = 0.3
+
+# Where the floor begins to fade into the background and where it ends, in distances of the focus.
+STUDIO_FADE = (0.4, 3.4)
+FADE = (1.5, 10.0)
+
 
 class SoftBox(NamedTuple):
     """A rectangular light that is far away."""
@@ -37,23 +58,6 @@ SOFT_BOX_LIGHTS = (
     SoftBox(-68.0, 28.0, 0.16, 0.75, (4.2, 4.7, 5.4)),
     SoftBox(10.0, 66.0, 0.65, 0.20, (3.6, 3.7, 3.8)),
 )
-BESIDE_LIGHTS = 0.5  # brightness of the soft boxes' reflections beside lights of the MJCF
-_MAX_FLOOR_TINT = 0.6  # share of the floor's colour that the background takes on, at most
-
-# Linear colour of the background where there is no floor, and colour overhead over the colour at
-# the horizon.
-_BARE_TINT = np.array([0.40, 0.42, 0.46])
-_ZENITH_TINT = np.array([0.36, 0.40, 0.48])
-
-# Radiance of the studio's sky over the mean colour of its background, and how much the horizon and
-# the zenith count in this mean.
-_STUDIO_SKY = 0.75
-_HORIZON_SHARE = 0.7
-_ZENITH_SHARE = 0.3
-
-# Where the floor begins to fade into the background and where it ends, in distances of the focus.
-STUDIO_FADE = (0.4, 3.4)
-FADE = (1.5, 10.0)
 
 
 def studio_lighting(pose: Pose) -> Lighting:

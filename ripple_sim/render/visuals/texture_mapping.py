@@ -106,18 +106,19 @@ def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     """
     material = visual.material
     half = visual.half_sizes
-    given = visual.texture
-    if given is None:
+    own_texture = visual.texture
+    if own_texture is None:
         roles = [] if material < 0 else [int(model.mat_texid[material, role]) for role in _ROLES]
-        texture = next((each for each in roles if each >= 0), -1)
+        texture = next((number for number in roles if number >= 0), -1)
     else:
-        texture = given.number
+        texture = own_texture.number
     if texture < 0 or model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
         return TextureMapping()
     cube = model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE
-    uniform = bool(model.mat_texuniform[material]) if given is None else given.uniform
+    uniform = bool(model.mat_texuniform[material]) if own_texture is None else own_texture.uniform
     repeat = np.array(
-        model.mat_texrepeat[material] if given is None else given.repeat, dtype=np.float64
+        model.mat_texrepeat[material] if own_texture is None else own_texture.repeat,
+        dtype=np.float64,
     )
     times = np.where(repeat > 0, repeat, 1.0) * np.where((half[:2] > 0) & uniform, half[:2], 1.0)
     factor = np.where(half > 0, half, 1.0) if cube and uniform else np.ones(3)
