@@ -114,10 +114,11 @@ def check_port(port: int, host: str) -> None:
         If the port is not free, or the host is not of this machine.
     """
     try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-        with socket.socket(found[0][0]) as trial:
+        addresses = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        family, _, _, _, address = addresses[0]
+        with socket.socket(family) as trial:
             trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            trial.bind(found[0][4])
+            trial.bind(address)
     except (OSError, OverflowError, UnicodeError) as error:
         raise DisplayError(
             f"cannot serve on port {port} of {host}: {error}; name another one with --port, or "

@@ -141,7 +141,7 @@ class RippleViewer:
         self._press()
         scene = self._handle.user_scn
         model = self._ripples.model
-        kept = []
+        saved = []  # arrays of the model that are changed for a moment, and their content
         if scene is None or not self.is_running():
             return
         users = scene.ngeom
@@ -161,7 +161,7 @@ class RippleViewer:
                 hidden: list[NDArray[Any]] = [colors, materials]
                 if is_geom(target, model):
                     hidden.append(model.geom_size[target])
-                kept += [(array, array.copy()) for array in hidden]
+                saved += [(array, array.copy()) for array in hidden]
                 # The mouse does not find what has no material and no opacity; with some it casts
                 # shadows, but within.
                 colors[:] = [*rgba[:3], 0.0 if model.nmat else _HIDDEN_OPACITY]
@@ -172,8 +172,8 @@ class RippleViewer:
             self._handle.sync(state_only)
         finally:
             scene.ngeom = users
-            for array, own in kept:
-                array[:] = own
+            for array, content in saved:
+                array[:] = content
 
     def close(self) -> None:
         """Close the window, and wait until it is closed.
@@ -246,25 +246,25 @@ class _Skin:
     def __init__(self, waves: WaveSolver, count: int) -> None:
         V = waves.rest.mesh.V
         F = waves.rest.mesh.F
-        kept = np.arange(len(V))
+        vertices = np.arange(len(V))
         edge = np.sqrt(2 * waves.rest.areas.sum() / count)
         while len(F) > count:
-            # one vertex for each cell of a grid, that in its middle
+            # of each cell of a grid the vertex nearest to the middle
             cells = np.floor((V - V.min(axis=0)) / edge).astype(np.int64)
             _, cell, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
             cell = cell.reshape(-1)
             middles = np.stack([np.bincount(cell, axis) for axis in V.T], axis=1) / counts[:, None]
             order = np.lexsort((np.linalg.norm(V - middles[cell], axis=1), cell))
-            kept = order[np.cumsum(counts) - counts]
+            vertices = order[np.cumsum(counts) - counts]
             F = cell[waves.rest.mesh.F]
             F = F[(F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])]
             F = F[np.unique(np.sort(F, axis=1), axis=0, return_index=True)[1]]
             edge *= 1.1
-        self._kept = kept
+        self._vertices = vertices
         self._F = F
         self._rest = V
-        self._normals = normalized(smooth_normals(V, waves.rest.mesh.F))[kept]
-        self._sampling = waves.rest.sampling_matrix(V[kept])
+        self._normals = normalized(smooth_normals(V, waves.rest.mesh.F))[vertices]
+        self._sampling = waves.rest.sampling_matrix(V[vertices])
 
     def triangles(
         self, ripples: Ripples, name: str, data: mujoco.MjData
@@ -276,14 +276,18 @@ class _Skin:
         normals = self._normals
         if moved is not None:
             V = moved
-            normals = normalized(smooth_normals(moved, waves.rest.mesh.F))[self._kept]
+            normals = normalized(smooth_normals(moved, waves.rest.mesh.F))[self._vertices]
         position, rotation = target_pose(data, ripples.geom_ids[name])
         heights = self._sampling @ waves.height.ravel()
-        points = position + (V[self._kept] + heights[:, None] * normals) @ rotation.T
-        corner, *edges = points[self._F].swapaxes(0, 1)
-        edges = [edge - corner for edge in edges]
-        axes = np.stack([normalized(each) for each in (*edges, np.cross(*edges))], axis=2)
-        sizes = np.stack(
-            [*(np.linalg.norm(edge, axis=1) for edge in edges), np.zeros(len(corner))], axis=1
+        points = position + (V[self._vertices] + heights[:, None] * normals) @ rotation.T
+        corner, second, third = points[self._F].swapaxes(0, 1)
+        first_edge = second - corner
+        second_edge = third - corner
+        normal = np.cross(first_edge, second_edge)
+        axes = np.stack(
+            [normalized(first_edge), normalized(second_edge), normalized(normal)], axis=2
         )
+        first_length = np.linalg.norm(first_edge, axis=1)
+        second_length = np.linalg.norm(second_edge, axis=1)
+        sizes = np.stack([first_length, second_length, np.zeros(len(corner))], axis=1)
         return sizes, corner, axes.reshape(-1, 9)

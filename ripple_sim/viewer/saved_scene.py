@@ -60,11 +60,11 @@ def moved_camera(scene: Scene, place: dict[str, Any]) -> CameraEntry:
 
     Raises `SceneError` for an impossible place.
     """
-    kept = {
+    other_settings = {
         name: value
         for name, value in msgspec.structs.asdict(scene.camera).items()
         if name not in _PLACES
     }
-    camera = converted({**kept, **place}, CameraEntry, "camera")
+    camera = converted({**other_settings, **place}, CameraEntry, "camera")
     check_camera(scene.model, camera)
     return camera

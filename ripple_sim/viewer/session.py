@@ -146,12 +146,14 @@ class Session:
     def refresh(self) -> None:
         """Bring the skins and the range of the colours up to date."""
         ripples = self.simulation.ripples
-        wanted = _MIN_RANGE * self.size
+        color_range = _MIN_RANGE * self.size
         for name, mesh in self.meshes.items():
             V = ripples.vertices(name, self.simulation.data)
-            self.skins[name] = shape = mesh.shape(ripples[name].height, ripples[name].velocity, V)
-            wanted = max(wanted, _RANGE_SHARE * float(np.abs(shape.height).max()))
-        self.color_range = max(wanted, _RANGE_DECAY * self.color_range)
+            waves = ripples[name]
+            shape = mesh.shape(waves.height, waves.velocity, V)
+            self.skins[name] = shape
+            color_range = max(color_range, _RANGE_SHARE * float(np.abs(shape.height).max()))
+        self.color_range = max(color_range, _RANGE_DECAY * self.color_range)
 
     def reset(self) -> None:
         """Restart from the beginning; the chosen material and operator stay."""

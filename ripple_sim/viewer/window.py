@@ -374,12 +374,12 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
     renderer = window.gl_renderer
     window.close()
     seconds, drawing, processor = min(trials)
-    simulate, draw, processor = (
-        1e3 / updates * each for each in (seconds - drawing, drawing, processor)
-    )
+    per_update = 1e3 / updates  # [ms] for each second of all updates
     return (
-        f"{updates / seconds:.1f} updates/s: simulation {simulate:.1f} ms, drawing {draw:.1f} ms; "
-        f"{processor:.1f} ms of processor time ({renderer})"
+        f"{updates / seconds:.1f} updates/s: "
+        f"simulation {per_update * (seconds - drawing):.1f} ms, "
+        f"drawing {per_update * drawing:.1f} ms; "
+        f"{per_update * processor:.1f} ms of processor time ({renderer})"
     )
 
 
