@@ -21,6 +21,9 @@ from ripple_sim.errors import DisplayError
 # [bytes]: largest message from the browser, which sends commands and places of the pointer
 LARGEST_MESSAGE = 64 * 1024
 
+# of TCP
+_MAX_PORT = 65535
+
 
 def new_secret() -> str:
     """128 random bits."""
@@ -111,8 +114,10 @@ def check_port(port: int, host: str) -> None:
     Raises
     ------
     DisplayError
-        If the port is not free, or the host is not of this machine.
+        If the port is no port or not free, or the host is not of this machine.
     """
+    if not 0 <= port <= _MAX_PORT:
+        raise DisplayError(f"port must be a whole number from 0 to {_MAX_PORT}, got {port}")
     try:
         addresses = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
         family, _, _, _, address = addresses[0]

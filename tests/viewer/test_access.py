@@ -13,6 +13,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from ripple_sim.errors import DisplayError
 from ripple_sim.scene import Scene
 from ripple_sim.viewer import PageServer, PageView, Session, access, served, view_of
 
@@ -172,3 +173,9 @@ def test_one_line_warns_of_an_exposed_viewer(tmp_path: Path) -> None:
     assert "\n" not in line
     for word in ("--host 0.0.0.0", "sees and drives", str(tmp_path), "nothing is encrypted"):
         assert word in line
+
+
+@pytest.mark.parametrize("port", [-1, 65536, 1234567])
+def test_a_number_that_is_no_port_is_refused(port: int) -> None:
+    with pytest.raises(DisplayError, match="port must be a whole number from 0 to 65535"):
+        access.check_port(port, "127.0.0.1")
