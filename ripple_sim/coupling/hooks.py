@@ -6,6 +6,9 @@
   has no callback after a step, and an environment takes its steps itself.
 - MuJoCo's handler of warnings, from `adopt_warnings` on: of itself MuJoCo writes warnings to
   standard error and to MUJOCO_LOG.TXT in the current folder.
+- `mujoco.rollout.rollout` and `mujoco.rollout.Rollout.rollout`, replaced for good by
+  `watch_rollouts`, which only programs with sensors of `add_sensor` call: a rollout takes its steps
+  in C, where nobody steps the waves, and would return empty samples without a word.
 - `step`, `reset` and `render` of a dm_control `Physics`, replaced for good by `hook_physics`: tasks
   and environments of dm_control call these methods, and need no change.
 
@@ -16,10 +19,12 @@ MuJoCo's renderers; it puts them back after the frame.
 from __future__ import annotations
 
 import contextlib
+import functools
+import inspect
 import random
 import re
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import mujoco
@@ -45,6 +50,9 @@ _mujoco_functions: dict[str, Callable[..., None]] = {}
 
 # Kinds of MuJoCo's warnings that were given already.
 _given_kinds: set[str] = set()
+
+# Warnings before rollouts that were given already.
+_given_rollout_warnings: set[str] = set()
 
 
 def can_be_marked(model: mujoco.MjModel) -> bool:
@@ -144,6 +152,43 @@ def _give_warning(message: str) -> None:
     _given_kinds.add(kind)
     with contextlib.suppress(RippleWarning):  # no exception can pass through MuJoCo
         warn_caller(f"MuJoCo: {text}")
+
+
+def watch_rollouts(warning_of: Callable[[mujoco.MjModel], str]) -> None:
+    """Warn before rollouts of MuJoCo, from now on, of each thing once.
+
+    Parameters
+    ----------
+    warning_of : callable
+        Returns the warning for a model, or "".
+    """
+    from mujoco import rollout  # takes 26 ms, which few programs need
+
+    for owner in (rollout, rollout.Rollout):
+        function = owner.rollout
+        if not hasattr(function, "__wrapped__"):
+            owner.rollout = _with_rollout_warning(function, warning_of)
+
+
+def _with_rollout_warning(
+    function: Callable[..., Any], warning_of: Callable[[mujoco.MjModel], str]
+) -> Callable[..., Any]:
+    """A rollout function of MuJoCo that warns first."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def rollout(*args: Any, **kwargs: Any) -> Any:
+        models = signature.bind_partial(*args, **kwargs).arguments.get("model")
+        # the models of a batch are alike
+        model = models[0] if isinstance(models, Sequence) and models else models
+        if isinstance(model, mujoco.MjModel):
+            warning = warning_of(model)
+            if warning and warning not in _given_rollout_warnings:
+                _given_rollout_warnings.add(warning)
+                warn_caller(warning)
+        return function(*args, **kwargs)
+
+    return rollout
 
 
 def hook_physics(

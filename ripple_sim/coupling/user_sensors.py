@@ -19,6 +19,7 @@ from ripple_sim.solver.errors import shown
 from ripple_sim.solver.waves.sensor import KINDS, check_sensor
 
 from .geoms import target_name
+from .hooks import watch_rollouts
 from .ids import TargetId, geom_id, target_of_flex, target_of_skin
 
 _OBJECT = mujoco.mjtObj
@@ -82,7 +83,7 @@ def add_sensor(
     time step, in order. They are those of `ripples[geom].sensor(site, kind, rate)`, in one unbroken
     row from step to step, late by its `latency`, rounded up to whole samples, and 0 before that.
     They stay until the next step, and a reset sets them to 0. Steps that `Ripples` does not see,
-    such as those of `mujoco.rollout`, leave them as they are.
+    such as those of `mujoco.rollout`, leave them as they are; a rollout gives one warning.
 
     Parameters
     ----------
@@ -143,6 +144,7 @@ def add_sensor(
         objname=[name, geom, site],
         objprm=[rate, KINDS.index(kind), thickness or 0.0],
     )
+    watch_rollouts(_rollout_warning)
     return sensor
 
 
@@ -166,7 +168,21 @@ def user_sensors(model: mujoco.MjModel) -> list[UserSensor]:
                 "name"
             )
         sensors.append(_user_sensor(model, elements))
+    if sensors:
+        watch_rollouts(_rollout_warning)
     return sensors
+
+
+def _rollout_warning(model: mujoco.MjModel) -> str:
+    """Warning before a rollout of a model with sensors on rippling surfaces; "" without them."""
+    tuples = [model.tuple(i) for i in range(model.ntuple)]
+    names = [model.sensor(int(t.objid[0])).name for t in tuples if _TUPLE in t.name]
+    if not names:
+        return ""
+    return (
+        f"mujoco.rollout does not step the waves: its sensordata has no samples of "
+        f"{', '.join(map(repr, names))}; step with Ripples.mj_step where you need them"
+    )
 
 
 def _describes_sensor(model: mujoco.MjModel, elements: slice) -> bool:

@@ -8,8 +8,10 @@ import re
 import mujoco
 import numpy as np
 import pytest
+from mujoco import rollout
 
 from ripple_sim import Material, RippleError, Ripples, RippleWarning, add_sensor
+from ripple_sim.coupling import hooks
 
 DT = 0.002
 RATE = 2000.0
@@ -189,3 +191,28 @@ def test_a_changed_tuple_is_refused() -> None:
     xml = re.sub(r'prm="2000"', 'prm="-1"', specification().to_xml())
     with pytest.raises(RippleError, match="tuple 'ripple-sim sensor rim' must have"):
         rippling(mujoco.MjModel.from_xml_string(xml))
+
+
+def rollout_of(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """States and sensor data of ten steps."""
+    data = mujoco.MjData(model)
+    state = np.zeros((1, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
+    mujoco.mj_getState(model, data, state[0], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    return rollout.rollout(model, data, state, nstep=10)
+
+
+def test_a_rollout_warns_once_that_nobody_steps_the_waves(monkeypatch) -> None:
+    monkeypatch.setattr(hooks, "_given_rollout_warnings", set())
+    model = specification().compile()
+    with pytest.warns(RippleWarning, match="has no samples of 'rim'") as warned:
+        _, sensors = rollout_of(model)
+        rollout_of(model)
+    assert len(warned) == 1
+    assert warned[0].filename == __file__
+    assert not sensors.any()
+
+
+def test_a_rollout_without_our_sensors_is_silent(recwarn) -> None:
+    specification()  # from here on rollouts are watched
+    rollout_of(mujoco.MjModel.from_xml_string(MODEL))
+    assert not recwarn.list
