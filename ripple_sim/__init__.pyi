@@ -2,6 +2,7 @@ from .batch.plan import read_plan as read_plan
 from .batch.report import load_batch as load_batch
 from .batch.run import RunOptions as RunOptions, run_batch as run_batch
 from .coupling.colliders import make_collidable as make_collidable
+from .coupling.map_sensors import add_height_map as add_height_map
 from .coupling.ripples import Impulse as Impulse, Ripples as Ripples
 from .coupling.target import Target as Target
 from .coupling.user_sensors import add_sensor as add_sensor

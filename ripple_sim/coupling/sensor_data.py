@@ -14,6 +14,7 @@ from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.waves.sensor import Sensor
 
 from .ids import TargetId
+from .map_sensors import HeightImage, map_sensors
 from .rippling import site_on
 from .target_waves import TargetWaves
 from .user_sensors import user_sensors
@@ -111,6 +112,15 @@ class SensorData:
             place = slice(record.begin, record.end)
             blocks = SampleBlocks(sensor, record.end - record.begin)
             self._blocks.append((place, blocks))
+        self._images: list[HeightImage] = []
+        for image in map_sensors(model):
+            if image.target in waves:
+                self._images.append(HeightImage(image, waves[image.target]))
+            else:
+                warn_caller(
+                    f"height map {image.name!r} is of a geom that does not ripple, and stays 0; "
+                    "give the geom a material in Ripples(model, materials)"
+                )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return SensorData, (self._model, self._waves)
@@ -131,6 +141,8 @@ class SensorData:
         """Write the samples of the latest step."""
         for place, blocks in self._blocks:
             data.sensordata[place] = blocks.latest()[:, 0]
+        for image in self._images:
+            image.draw(self._waves[image.sensor.target], data)
 
     def clear(self, data: mujoco.MjData | None) -> None:
         """Forget all samples, and write zeros."""
@@ -138,3 +150,5 @@ class SensorData:
             blocks.clear()
             if data is not None:
                 data.sensordata[place] = 0.0
+        for image in self._images:
+            image.clear(data)

@@ -29,6 +29,7 @@ _TARGET_TYPES = (_OBJECT.mjOBJ_GEOM, _OBJECT.mjOBJ_FLEX, _OBJECT.mjOBJ_SKIN)
 
 # Beginning of the names of the tuples; `attach` may put a prefix before it.
 _TUPLE = "ripple-sim sensor "
+MAP_TUPLE = "ripple-sim height map "
 
 # Largest number of samples in a time step; a sensor of 48,000 samples a second has 48 in 1 ms.
 _MAX_SAMPLES = 100_000
@@ -115,15 +116,9 @@ def add_sensor(
     SolverError
         For an invalid kind, rate or thickness.
     """
-    if not isinstance(spec, mujoco.MjSpec):
-        raise SceneError(f"spec must be a mujoco.MjSpec, got {shown(spec)}")
+    require_free_name(spec, name)
     check_sensor(kind, rate, thickness)
-    if not isinstance(name, str) or not name or spec.sensor(name) is not None:
-        raise SceneError(
-            "the name of a sensor must be a str that no other sensor of the specification has, got "
-            f"{shown(name)}"
-        )
-    target_type = _target_type(spec, geom)
+    target_type = type_of_target(spec, geom)
     if not isinstance(site, str) or spec.site(site) is None:
         sites = ", ".join(repr(other.name) for other in spec.sites if other.name)
         raise SceneError(
@@ -144,7 +139,7 @@ def add_sensor(
         objname=[name, geom, site],
         objprm=[rate, KINDS.index(kind), thickness or 0.0],
     )
-    watch_rollouts(_rollout_warning)
+    watch_rollouts(rollout_warning)
     return sensor
 
 
@@ -169,14 +164,15 @@ def user_sensors(model: mujoco.MjModel) -> list[UserSensor]:
             )
         sensors.append(_user_sensor(model, elements))
     if sensors:
-        watch_rollouts(_rollout_warning)
+        watch_rollouts(rollout_warning)
     return sensors
 
 
-def _rollout_warning(model: mujoco.MjModel) -> str:
+def rollout_warning(model: mujoco.MjModel) -> str:
     """Warning before a rollout of a model with sensors on rippling surfaces; "" without them."""
     tuples = [model.tuple(i) for i in range(model.ntuple)]
-    names = [model.sensor(int(t.objid[0])).name for t in tuples if _TUPLE in t.name]
+    own = [t for t in tuples if _TUPLE in t.name or MAP_TUPLE in t.name]
+    names = [model.sensor(int(t.objid[0])).name for t in own]
     if not names:
         return ""
     return (
@@ -201,7 +197,7 @@ def _user_sensor(model: mujoco.MjModel, elements: slice) -> UserSensor:
     """The sensor that the elements of a tuple describe."""
     sensor_id, target_id, site_id = (int(number) for number in model.tuple_objid[elements])
     rate, kind_index, thickness = (float(number) for number in model.tuple_objprm[elements])
-    target = _target(model, int(model.tuple_objtype[elements][1]), target_id)
+    target = target_with_id(model, int(model.tuple_objtype[elements][1]), target_id)
     sensor = UserSensor(
         name=model.sensor(sensor_id).name,
         target=target,
@@ -223,7 +219,18 @@ def _user_sensor(model: mujoco.MjModel, elements: slice) -> UserSensor:
     return sensor
 
 
-def _target_type(spec: mujoco.MjSpec, name: str) -> mujoco.mjtObj:
+def require_free_name(spec: mujoco.MjSpec, name: str) -> None:
+    """Raise `SceneError` unless a specification can take a sensor of this name."""
+    if not isinstance(spec, mujoco.MjSpec):
+        raise SceneError(f"spec must be a mujoco.MjSpec, got {shown(spec)}")
+    if not isinstance(name, str) or not name or spec.sensor(name) is not None:
+        raise SceneError(
+            "the name of a sensor must be a str that no other sensor of the specification has, got "
+            f"{shown(name)}"
+        )
+
+
+def type_of_target(spec: mujoco.MjSpec, name: str) -> mujoco.mjtObj:
     """What a name is: a geom, a flex or a skin."""
     if isinstance(name, str) and name:
         if spec.geom(name) is not None:
@@ -239,7 +246,7 @@ def _target_type(spec: mujoco.MjSpec, name: str) -> mujoco.mjtObj:
     )
 
 
-def _target(model: mujoco.MjModel, kind: int, number: int) -> TargetId:
+def target_with_id(model: mujoco.MjModel, kind: int, number: int) -> TargetId:
     """Target id of the geom, flex or skin with an id."""
     if kind == _OBJECT.mjOBJ_FLEX:
         return target_of_flex(model, number)
