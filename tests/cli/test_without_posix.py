@@ -87,7 +87,7 @@ def test_the_viewer_starts_and_ends_without_posix(windows, opengl, tmp_path):
         assert address is not None
         with urllib.request.urlopen(address[0], timeout=60) as page:
             assert b"<html" in page.read()
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGTERM)  # a job in the background ignores SIGINT
         _, errors = process.communicate(timeout=60)
     finally:
         process.kill()
