@@ -19,6 +19,16 @@ _IMAGES = (12, 1)
 # The same of emission.
 _EMISSION_IMAGES = 4
 
+# The same of images that are not shown, with what they are.
+_NOT_SHOWN = {
+    5: "normal maps",  # heights
+    6: "normal maps",
+    10: "occlusion",  # light maps
+    15: "metalness and roughness by image",
+    16: "metalness and roughness by image",
+    17: "occlusion",
+}
+
 
 def main(source: str, target: str) -> None:
     """Read `source`, and write the triangles of all nodes and their materials to `target`."""
@@ -94,6 +104,7 @@ def _material(material: dict[str, Any]) -> dict[str, Any]:
         "image": images[0] if images else None,
         "emission": [float(value) for value in emission[:3]],
         "emission_image": emission_images[0] if emission_images else None,
+        "not_shown": [words for number, words in _NOT_SHOWN.items() if textures.get(number)],
     }
 
 

@@ -137,8 +137,11 @@ def _soup(path: Path, arrays: dict[str, NDArray]) -> Soup:
     if np.isfinite(arrays["colors"]).any():
         white = np.where(np.isfinite(arrays["colors"]), arrays["colors"], 1.0)
         colors = linear_light(white)[F]
-    paints = tuple(_paint(path, material) for material in json.loads(str(arrays["materials"])))
-    looks = Looks(paints, arrays["material"], colors) if paints and len(F) else None
+    materials = json.loads(str(arrays["materials"]))
+    paints = tuple(_paint(path, material) for material in materials)
+    words = sorted({word for material in materials for word in material["not_shown"]})
+    notes = (f"not shown of its materials: {', '.join(words)}",) if words else ()
+    looks = Looks(paints, arrays["material"], colors, notes) if paints and len(F) else None
     return Soup(arrays["V"], F, corner_uv, (), looks)
 
 

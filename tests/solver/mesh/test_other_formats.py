@@ -48,6 +48,16 @@ def _with_assimp() -> None:
     pytest.importorskip("assimp_py")
 
 
+def test_what_is_not_shown_of_a_material_is_named(tmp_path: Path) -> None:
+    bump = '<bump><texture texture="t" texcoord="UV"/></bump>'
+    extra = f'<extra><technique profile="FCOLLADA">{bump}</technique></extra>'
+    (tmp_path / "a b.png").write_bytes(png([[[255, 0, 0]]]))
+    end = "</technique></profile_COMMON>"
+    (tmp_path / "a.dae").write_text(DAE.replace(end, extra + end))
+    mesh = load_mesh(tmp_path / "a.dae")
+    assert mesh.looks.notes == ("not shown of its materials: normal maps",)
+
+
 def test_x3d_has_its_transforms_and_colours(tmp_path: Path) -> None:
     (tmp_path / "a.x3d").write_text(X3D)
     mesh = load_mesh(tmp_path / "a.x3d")
