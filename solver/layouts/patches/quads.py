@@ -502,12 +502,18 @@ def _length(part: TriangleSurface) -> float:
 
 
 def _cells_of(part: TriangleSurface, count: int) -> BorderedCells:
+    """About `count` cells of a surface, or as many as a very long surface allows.
+
+    Raises `AtlasError` if it is too long for a single cell.
+    """
     area = part.areas.sum()
-    if count * _length(part) > _MAX_LENGTH_TIMES_CELLS:
+    most_cells = int(_MAX_LENGTH_TIMES_CELLS / _length(part))
+    if most_cells < 1:
         raise AtlasError(
             f"the surface is about {_length(part):.2g} times as long as wide, too long for charts: "
             f"shorten what sticks out of it, or scale it alike along all axes"
         )
+    count = min(count, most_cells)
     longest_edge = np.sqrt(area / (_AREA_IN_EDGE_SQUARES / CELLS * count))  # [m]
     metric = Metric.of(refined(part, longest_edge))
     reach = np.inf  # a single cell covers all
