@@ -167,18 +167,18 @@ def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:
     uv = None
     if mapping.kind == MappingKind.FLAT_IMAGE:
         # a mesh asset counts v as MuJoCo does, from the upper edge
-        own = mesh.uv if mapping.own and mesh.uv is not None else mapping.at(points)
-        uv = texture_places(mapping, own)[mesh.faces]
-    own = model.site(visual.index) if visual.site else model.geom(visual.index)
-    name = own.name or f"site {visual.index}"
+        coordinates = mesh.uv if mapping.own and mesh.uv is not None else mapping.at(points)
+        uv = texture_places(mapping, coordinates)[mesh.faces]
+    element = model.site(visual.index) if visual.site else model.geom(visual.index)
+    name = element.name or f"site {visual.index}"
     if not visual.site:
         name = geom_name(model, geom_id(visual.index))
-    position = np.array(own.pos)
-    quaternion = np.array(own.quat)
+    position = np.array(element.pos)
+    quaternion = np.array(element.quat)
     normals = normalized(mesh.normals)
     if visual.kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # the ball's normals, stretched
         normals = normalized(normals / visual.half_sizes)
     finish = _finish(model, look_of(model, visual), visual.color, mapping, visual.opacity)
     return Solid(
-        finish, name, int(own.bodyid[0]), position, quaternion, points, normals, mesh.faces, uv
+        finish, name, int(element.bodyid[0]), position, quaternion, points, normals, mesh.faces, uv
     )
