@@ -21,16 +21,17 @@ from numpy.typing import NDArray
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import is_finite, shown, whole
 
-from .hooks import watch_rollouts
 from .ids import TargetId
-from .target_waves import TargetWaves
-from .user_sensors import (
+from .sensor_tuples import (
     MAP_TUPLE,
+    add_tuple,
+    names_sensor_and_target,
     require_free_name,
-    rollout_warning,
     target_with_id,
+    tuples_of,
     type_of_target,
 )
+from .target_waves import TargetWaves
 
 _OBJECT = mujoco.mjtObj
 
@@ -132,7 +133,6 @@ def add_height_map(
                 f"{shown(side)}"
             )
     kind = type_of_target(spec, geom)
-    watch_rollouts(rollout_warning)
     sensor = spec.add_sensor(
         name=name,
         type=mujoco.mjtSensor.mjSENS_USER,
@@ -141,11 +141,12 @@ def add_height_map(
         datatype=mujoco.mjtDataType.mjDATATYPE_REAL,
         needstage=mujoco.mjtStage.mjSTAGE_NONE,
     )
-    spec.add_tuple(
-        name=MAP_TUPLE + name,
-        objtype=[_OBJECT.mjOBJ_SENSOR, kind, _OBJECT.mjOBJ_SENSOR, _OBJECT.mjOBJ_SENSOR],
-        objname=[name, geom, name, name],
-        objprm=[limit, rate, width, height],
+    add_tuple(
+        spec,
+        MAP_TUPLE + name,
+        [_OBJECT.mjOBJ_SENSOR, kind, _OBJECT.mjOBJ_SENSOR, _OBJECT.mjOBJ_SENSOR],
+        [name, geom, name, name],
+        [limit, rate, width, height],
     )
     return sensor
 
@@ -156,16 +157,12 @@ def map_sensors(model: mujoco.MjModel) -> list[MapSensor]:
     Raises `SceneError` if the tuple of one has been changed.
     """
     sensors = []
-    for i in range(model.ntuple):
-        name = model.tuple(i).name
-        if MAP_TUPLE not in name:
-            continue
-        first = int(model.tuple_adr[i])
-        elements = slice(first, first + int(model.tuple_size[i]))
+    for name, elements in tuples_of(model, MAP_TUPLE):
         types = model.tuple_objtype[elements].tolist()
         numbers = model.tuple_objprm[elements].tolist()
         ids = model.tuple_objid[elements].tolist()
-        if len(types) != 4 or not _has_room(model, ids[0], numbers):
+        is_whole = len(types) == 4 and names_sensor_and_target(model, elements)
+        if not is_whole or not _has_room(model, ids[0], numbers):
             raise SceneError(
                 f"tuple {name!r} must have a user sensor and a geom, flex or skin, with limit, "
                 "rate, width and height, as add_height_map makes it; give tuples of your own "

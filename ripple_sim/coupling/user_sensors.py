@@ -19,17 +19,18 @@ from ripple_sim.solver.errors import shown
 from ripple_sim.solver.waves.sensor import KINDS, check_sensor
 
 from .geoms import target_name
-from .hooks import watch_rollouts
-from .ids import TargetId, geom_id, target_of_flex, target_of_skin
+from .ids import TargetId
+from .sensor_tuples import (
+    SENSOR_TUPLE,
+    add_tuple,
+    names_sensor_and_target,
+    require_free_name,
+    target_with_id,
+    tuples_of,
+    type_of_target,
+)
 
 _OBJECT = mujoco.mjtObj
-
-# Types of objects that may ripple.
-_TARGET_TYPES = (_OBJECT.mjOBJ_GEOM, _OBJECT.mjOBJ_FLEX, _OBJECT.mjOBJ_SKIN)
-
-# Beginning of the names of the tuples; `attach` may put a prefix before it.
-_TUPLE = "ripple-sim sensor "
-MAP_TUPLE = "ripple-sim height map "
 
 # Largest number of samples in a time step; a sensor of 48,000 samples a second has 48 in 1 ms.
 _MAX_SAMPLES = 100_000
@@ -133,13 +134,13 @@ def add_sensor(
         datatype=mujoco.mjtDataType.mjDATATYPE_REAL,
         needstage=mujoco.mjtStage.mjSTAGE_NONE,
     )
-    spec.add_tuple(
-        name=_TUPLE + name,
-        objtype=[_OBJECT.mjOBJ_SENSOR, target_type, _OBJECT.mjOBJ_SITE],
-        objname=[name, geom, site],
-        objprm=[rate, KINDS.index(kind), thickness or 0.0],
+    add_tuple(
+        spec,
+        SENSOR_TUPLE + name,
+        [_OBJECT.mjOBJ_SENSOR, target_type, _OBJECT.mjOBJ_SITE],
+        [name, geom, site],
+        [rate, KINDS.index(kind), thickness or 0.0],
     )
-    watch_rollouts(rollout_warning)
     return sensor
 
 
@@ -150,12 +151,7 @@ def user_sensors(model: mujoco.MjModel) -> list[UserSensor]:
     been changed.
     """
     sensors = []
-    for i in range(model.ntuple):
-        name = model.tuple(i).name
-        if _TUPLE not in name:
-            continue
-        first = int(model.tuple_adr[i])
-        elements = slice(first, first + int(model.tuple_size[i]))
+    for name, elements in tuples_of(model, SENSOR_TUPLE):
         if not _describes_sensor(model, elements):
             raise SceneError(
                 f"tuple {name!r} must have a user sensor, a geom, flex or skin, and a site, with "
@@ -163,34 +159,18 @@ def user_sensors(model: mujoco.MjModel) -> list[UserSensor]:
                 "name"
             )
         sensors.append(_user_sensor(model, elements))
-    if sensors:
-        watch_rollouts(rollout_warning)
     return sensors
-
-
-def rollout_warning(model: mujoco.MjModel) -> str:
-    """Warning before a rollout of a model with sensors on rippling surfaces; "" without them."""
-    tuples = [model.tuple(i) for i in range(model.ntuple)]
-    own = [t for t in tuples if _TUPLE in t.name or MAP_TUPLE in t.name]
-    names = [model.sensor(int(t.objid[0])).name for t in own]
-    if not names:
-        return ""
-    return (
-        f"mujoco.rollout does not step the waves: its sensordata has no samples of "
-        f"{', '.join(map(repr, names))}; step with Ripples.mj_step where you need them"
-    )
 
 
 def _describes_sensor(model: mujoco.MjModel, elements: slice) -> bool:
     """Whether the elements of a tuple are as `add_sensor` makes them."""
     types = model.tuple_objtype[elements].tolist()
-    if len(types) != 3 or types[1] not in _TARGET_TYPES:
+    if not names_sensor_and_target(model, elements):
         return False
-    if types[0] != _OBJECT.mjOBJ_SENSOR or types[2] != _OBJECT.mjOBJ_SITE:
+    if len(types) != 3 or types[2] != _OBJECT.mjOBJ_SITE:
         return False
     rate, kind_index, _ = model.tuple_objprm[elements]
-    is_user = model.sensor_type[model.tuple_objid[elements][0]] == mujoco.mjtSensor.mjSENS_USER
-    return bool(is_user and rate > 0 and kind_index in range(len(KINDS)))
+    return bool(rate > 0 and kind_index in range(len(KINDS)))
 
 
 def _user_sensor(model: mujoco.MjModel, elements: slice) -> UserSensor:
@@ -217,42 +197,6 @@ def _user_sensor(model: mujoco.MjModel, elements: slice) -> UserSensor:
             f"{model.opt.timestep:g} s: set the time step before add_sensor, and keep it"
         )
     return sensor
-
-
-def require_free_name(spec: mujoco.MjSpec, name: str) -> None:
-    """Raise `SceneError` unless a specification can take a sensor of this name."""
-    if not isinstance(spec, mujoco.MjSpec):
-        raise SceneError(f"spec must be a mujoco.MjSpec, got {shown(spec)}")
-    if not isinstance(name, str) or not name or spec.sensor(name) is not None:
-        raise SceneError(
-            "the name of a sensor must be a str that no other sensor of the specification has, got "
-            f"{shown(name)}"
-        )
-
-
-def type_of_target(spec: mujoco.MjSpec, name: str) -> mujoco.mjtObj:
-    """What a name is: a geom, a flex or a skin."""
-    if isinstance(name, str) and name:
-        if spec.geom(name) is not None:
-            return _OBJECT.mjOBJ_GEOM
-        if spec.flex(name) is not None:
-            return _OBJECT.mjOBJ_FLEX
-        if spec.skin(name) is not None:
-            return _OBJECT.mjOBJ_SKIN
-    names = ", ".join(repr(other.name) for other in spec.geoms if other.name)
-    raise SceneError(
-        f"the specification has no geom, flex or skin {shown(name)}; its named geoms are "
-        f"{names or 'none'}"
-    )
-
-
-def target_with_id(model: mujoco.MjModel, kind: int, number: int) -> TargetId:
-    """Target id of the geom, flex or skin with an id."""
-    if kind == _OBJECT.mjOBJ_FLEX:
-        return target_of_flex(model, number)
-    if kind == _OBJECT.mjOBJ_SKIN:
-        return target_of_skin(model, number)
-    return geom_id(number)
 
 
 def _samples_in_step(rate: float, timestep: float) -> int:

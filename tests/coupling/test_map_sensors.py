@@ -3,8 +3,10 @@
 import mujoco
 import numpy as np
 import pytest
+from mujoco import rollout
 
 from ripple_sim import Material, RippleError, Ripples, RippleWarning, add_height_map
+from ripple_sim.coupling import hooks
 from ripple_sim.coupling.map_sensors import MapSensor, texels_of_pixels
 
 DT = 0.005
@@ -89,9 +91,13 @@ def test_a_height_map_outlives_xml() -> None:
 
 def test_a_changed_tuple_is_refused() -> None:
     xml = specification().to_xml()
-    assert f'prm="{WIDTH}"' in xml
-    with pytest.raises(RippleError, match="tuple 'ripple-sim height map map' must have"):
-        rippling(mujoco.MjModel.from_xml_string(xml.replace(f'prm="{WIDTH}"', 'prm="25"')))
+    for old, new in (
+        (f'prm="{WIDTH}"', 'prm="25"'),
+        ('"geom" objname="bell"', '"body" objname="world"'),
+    ):
+        assert old in xml
+        with pytest.raises(RippleError, match="tuple 'ripple-sim height map map' must have"):
+            rippling(mujoco.MjModel.from_xml_string(xml.replace(old, new)))
 
 
 @pytest.mark.parametrize("charts", [1, 5, 6, 50])
@@ -130,3 +136,11 @@ def test_a_height_map_of_a_geom_without_ripples_warns() -> None:
 def test_invalid_height_maps_are_refused(options: dict, message: str) -> None:
     with pytest.raises(RippleError, match=message):
         specification(**options)
+
+
+def test_a_rollout_of_a_height_map_warns(monkeypatch) -> None:
+    monkeypatch.setattr(hooks, "_given_rollout_warnings", set())
+    model = specification().compile()
+    state = np.zeros((1, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
+    with pytest.warns(RippleWarning, match="has no samples of 'map'"):
+        rollout.rollout(model, mujoco.MjData(model), state, nstep=2)
